@@ -126,23 +126,12 @@ const MAX_TETRAHEDRA: usize = 50_000_000;
 /// When the mesh has no union, the tolerance is not positive, or so fine that more than 50 million
 /// tetrahedra would be needed, and when nothing is thick enough to show.
 pub fn union_surface(mesh: &MedialMesh, tolerance: f64) -> Result<UnionSurface, ContourError> {
-    union_surface_within(mesh, tolerance, MAX_TETRAHEDRA)
+    union_surface_while(mesh, tolerance, MAX_TETRAHEDRA, || true)
 }
 
-/// [`union_surface`] with at most `most` tetrahedra, of some 80 bytes each.
-///
-/// # Errors
-/// As [`union_surface`].
-pub fn union_surface_within(
-    mesh: &MedialMesh,
-    tolerance: f64,
-    most: usize,
-) -> Result<UnionSurface, ContourError> {
-    union_surface_while(mesh, tolerance, most, || true)
-}
-
-/// [`union_surface_within`] for as long as `go_on` says so, which is asked every few ten thousand
-/// vertices: of a [`RunContext`](crate::simplifier::RunContext), `|| run.step(0, 1).is_ok()`.
+/// [`union_surface`] with at most `most` tetrahedra, of some 80 bytes each, for as long as `go_on`
+/// returns true. It is called every few ten thousand vertices: of a
+/// [`RunContext`](crate::simplifier::RunContext), `|| run.step(0, 1).is_ok()`.
 ///
 /// # Errors
 /// As [`union_surface`], and [`ContourError::Cancelled`] if it was stopped.

@@ -9,9 +9,7 @@ mod union;
 pub mod union_axis;
 mod voronoi;
 
-pub use contour::{
-    ContourError, UnionSurface, union_surface, union_surface_while, union_surface_within,
-};
+pub use contour::{ContourError, UnionSurface, union_surface, union_surface_while};
 pub use formats::{
     LoadedMa, Look, MaError, MaErrorKind, Radii, ReadOptions, SphereValues, parse_ma,
     parse_ma_with, parse_obj, parse_ply, parse_ply_with, read, read_content, read_with,

@@ -43,11 +43,14 @@ const CROWD: usize = 40;
 /// Smaller gains than this fraction of the diameter are rounding.
 const GAIN: f64 = 1e-10;
 
-/// A point of a surface, with its distance from the other one.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Summit {
+/// A place and its distance from the other surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Peak {
+    /// A point of the surface, or of the union's boundary.
     pub point: Vec3,
-    pub value: f64,
+    /// How far it is from the other one: `|sigma|` of a point of the surface, the distance from the
+    /// surface of a point of the union's boundary.
+    pub distance: f64,
 }
 
 /// The results of the last searches, from which the next ones start.
@@ -60,7 +63,7 @@ pub(super) struct Near {
 /// A surface, and a distance at each of its points.
 pub(super) trait Hill: Sync {
     /// A point of the surface near to `p` with its distance, where one is found.
-    fn near(&self, p: Vec3, near: &mut Near) -> Option<Summit>;
+    fn near(&self, p: Vec3, near: &mut Near) -> Option<Peak>;
 }
 
 /// The points of a triangle mesh.
@@ -71,10 +74,10 @@ pub(super) struct OnMesh<'a, F> {
 }
 
 impl<F: Fn(Vec3, &mut usize) -> f64 + Sync> Hill for OnMesh<'_, F> {
-    fn near(&self, p: Vec3, near: &mut Near) -> Option<Summit> {
+    fn near(&self, p: Vec3, near: &mut Near) -> Option<Peak> {
         let closest = self.mesh.closest_from(p, near.face);
         near.face = Some(closest.face);
-        Some(Summit { point: closest.point, value: (self.value)(closest.point, &mut near.place) })
+        Some(Peak { point: closest.point, distance: (self.value)(closest.point, &mut near.place) })
     }
 }
 
@@ -87,11 +90,11 @@ pub(super) struct OnUnion<'a> {
 }
 
 impl Hill for OnUnion<'_> {
-    fn near(&self, p: Vec3, near: &mut Near) -> Option<Summit> {
+    fn near(&self, p: Vec3, near: &mut Near) -> Option<Peak> {
         let point = self.union.boundary_near(p, self.burial, &mut near.place)?;
         let closest = self.surface.closest_from(point, near.face);
         near.face = Some(closest.face);
-        Some(Summit { point, value: closest.distance })
+        Some(Peak { point, distance: closest.distance })
     }
 }
 
@@ -109,8 +112,8 @@ pub(super) struct Start<'a> {
 }
 
 /// The points that the ascent reaches from the largest of some samples, one for each seed.
-pub(super) fn ascend(hill: &impl Hill, start: &Start<'_>) -> Vec<Summit> {
-    let mut climbers: Vec<(Summit, Near)> =
+pub(super) fn ascend(hill: &impl Hill, start: &Start<'_>) -> Vec<Peak> {
+    let mut climbers: Vec<(Peak, Near)> =
         start.pick().into_iter().map(|seed| (seed, Near::default())).collect();
     let gain = GAIN * start.pose.diameter();
     let mut given_up = Vec::new();
@@ -120,24 +123,24 @@ pub(super) fn ascend(hill: &impl Hill, start: &Start<'_>) -> Vec<Summit> {
             let arms = directions(start.pose, halving * ROUNDS + round).map(|d| d * step);
             climbers.par_iter_mut().for_each(|climber| climb(hill, &arms, gain, climber));
         }
-        climbers.sort_by(|(a, _), (b, _)| b.value.total_cmp(&a.value));
+        climbers.sort_by(|(a, _), (b, _)| b.distance.total_cmp(&a.distance));
         step *= 0.5;
         let keep = climbers.len().div_ceil(2).max(LAST_SEEDS);
-        let best = climbers.first().map_or(0.0, |(peak, _)| peak.value);
+        let best = climbers.first().map_or(0.0, |(peak, _)| peak.distance);
         // Steps halve, so all that are still to come add up to twice the next ones.
         let hopeless = best - 2.0 * ROUNDS as f64 * step;
-        let kept = climbers.partition_point(|(peak, _)| peak.value >= hopeless).min(keep);
+        let kept = climbers.partition_point(|(peak, _)| peak.distance >= hopeless).min(keep);
         given_up.extend(climbers.drain(kept..).map(|(peak, _)| peak));
     }
     climbers.into_iter().map(|(peak, _)| peak).chain(given_up).collect()
 }
 
 /// Moves a climber to the best of the points around it, if that is better.
-fn climb(hill: &impl Hill, arms: &[Vec3], gain: f64, (peak, near): &mut (Summit, Near)) {
+fn climb(hill: &impl Hill, arms: &[Vec3], gain: f64, (peak, near): &mut (Peak, Near)) {
     let here = peak.point;
     for &arm in arms {
         if let Some(found) = hill.near(here + arm, near)
-            && found.value > peak.value + gain
+            && found.distance > peak.distance + gain
         {
             *peak = found;
         }
@@ -147,16 +150,16 @@ fn climb(hill: &impl Hill, arms: &[Vec3], gain: f64, (peak, near): &mut (Summit,
 impl Start<'_> {
     /// The largest samples that are at least a step apart. Samples equal up to rounding are taken in
     /// the order of the pose's curve, which depends neither on numbering nor on orientation.
-    fn pick(&self) -> Vec<Summit> {
+    fn pick(&self) -> Vec<Peak> {
         let grain = GAIN * self.pose.diameter();
         let mut ranked: Vec<_> = self
             .largest()
             .into_iter()
-            .map(|k| Summit { point: self.points[k], value: self.values[k] })
-            .map(|peak| (((-peak.value / grain).round(), self.pose.place_of(peak.point)), peak))
+            .map(|k| Peak { point: self.points[k], distance: self.values[k] })
+            .map(|peak| (((-peak.distance / grain).round(), self.pose.place_of(peak.point)), peak))
             .collect();
         ranked.sort_by(|((a, at), _), ((b, other), _)| a.total_cmp(b).then_with(|| at.cmp(other)));
-        let mut seeds: Vec<Summit> = Vec::with_capacity(self.seeds);
+        let mut seeds: Vec<Peak> = Vec::with_capacity(self.seeds);
         for (_, peak) in ranked {
             let apart = self.spacing * self.spacing;
             if seeds.iter().all(|seed| seed.point.distance_squared(peak.point) >= apart) {
@@ -205,16 +208,6 @@ fn directions(pose: &Pose, round: usize) -> [Vec3; 12] {
 }
 
 // Where a union is farthest from a surface, both ways: for methods that mend their worst places.
-
-/// A place and its distance from the other surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Peak {
-    /// A point of the surface, or of the union's boundary.
-    pub point: Vec3,
-    /// How far it is from the other one: `|sigma|` of a point of the surface, the distance from the
-    /// surface of a point of the union's boundary.
-    pub distance: f64,
-}
 
 /// The worst places of a medial mesh, the largest distance first.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -290,11 +283,9 @@ impl<'a> PeakSearch<'a> {
 }
 
 /// Peaks and samples above half the largest, the largest first.
-fn sorted(peaks: Vec<Summit>, points: &[Vec3], values: &[f64]) -> Vec<Peak> {
-    let peaks = peaks.into_iter().map(|peak| Peak { point: peak.point, distance: peak.value });
-    let samples = points.iter().zip(values);
-    let samples = samples.map(|(&point, &distance)| Peak { point, distance });
-    let mut all: Vec<Peak> = peaks.chain(samples).collect();
+fn sorted(peaks: Vec<Peak>, points: &[Vec3], values: &[f64]) -> Vec<Peak> {
+    let mut all = peaks;
+    all.extend(points.iter().zip(values).map(|(&point, &distance)| Peak { point, distance }));
     let largest = all.iter().map(|peak| peak.distance).fold(0.0, f64::max);
     all.retain(|peak| peak.distance >= 0.5 * largest);
     // Stable: peaks come before samples of the same distance.
@@ -316,17 +307,19 @@ mod tests {
     }
 
     /// A start from points that all miss the maximum.
-    fn best(hill: &impl Hill, surface: &TriMesh, points: &[Vec3], spacing: f64) -> Summit {
+    fn best(hill: &impl Hill, surface: &TriMesh, points: &[Vec3], spacing: f64) -> Peak {
         let pose = Pose::new(surface);
         let mut near = Near::default();
         let values: Vec<f64> =
-            points.iter().map(|&p| hill.near(p, &mut near).unwrap().value).collect();
+            points.iter().map(|&p| hill.near(p, &mut near).unwrap().distance).collect();
         let start = Start { pose: &pose, points, values: &values, spacing, seeds: 8 };
         let peaks = ascend(hill, &start);
         assert!(
-            peaks.iter().all(|p| p.value <= hill.near(p.point, &mut near).unwrap().value + 1e-12)
+            peaks
+                .iter()
+                .all(|p| p.distance <= hill.near(p.point, &mut near).unwrap().distance + 1e-12)
         );
-        peaks.into_iter().max_by(|a, b| a.value.total_cmp(&b.value)).unwrap()
+        peaks.into_iter().max_by(|a, b| a.distance.total_cmp(&b.distance)).unwrap()
     }
 
     #[test]
@@ -343,7 +336,7 @@ mod tests {
         let area = (b - a).cross(c - a).length() / 2.0;
         let radius = a.distance(b) * b.distance(c) * c.distance(a) / (4.0 * area);
         let found = best(&hill, &surface, &[Vec3::new(0.35, 0.45, 0.0)], 0.1);
-        assert!((found.value - (radius - 0.05)).abs() < 1e-3 * radius, "{found:?}, {radius}");
+        assert!((found.distance - (radius - 0.05)).abs() < 1e-3 * radius, "{found:?}, {radius}");
     }
 
     #[test]
@@ -356,7 +349,7 @@ mod tests {
         let hill = OnUnion { union: &union, surface: &tree, burial: 1e-12 };
         // Beside the pole that is farthest from the square.
         let found = best(&hill, &surface, &[Vec3::new(0.15, 0.55, -1.49)], 0.1);
-        assert!((found.value - 1.5).abs() < 1e-6, "{found:?}");
+        assert!((found.distance - 1.5).abs() < 1e-6, "{found:?}");
         assert!(union.signed(found.point).abs() < 1e-12);
     }
 

@@ -116,10 +116,15 @@ pub fn certify(
     let goal = tolerance - 2.5 * ROUNDING;
     let side = SurfaceSide { union: &union, hulls: &hulls };
     // A good lower bound before the first piece is divided: the maximum is often at a vertex.
-    let (lower, point) = side.farthest_of(&surface.vertices);
-    let witness = Witness { point, on: WitnessSide::Surface };
-    let mut search = Search { lower, witness, upper: 0.0, goal, pieces: 0 };
-    search.run(&side, side.pieces(surface))?;
+    let witness = Witness { point: surface.vertices[0], on: WitnessSide::Surface };
+    let mut search = Search { lower: 0.0, witness, upper: 0.0, goal, pieces: 0 };
+    for (signed, &point) in union.signed_batch(&surface.vertices).into_iter().zip(&surface.vertices)
+    {
+        if signed.abs() > search.lower {
+            (search.lower, search.witness.point) = (signed.abs(), point);
+        }
+    }
+    search.run(&side, (0..surface.faces.len()).map(|face| surface.triangle(face)).collect())?;
     let side = UnionSide::new(surface, bvh, mesh, &union, &hulls);
     search.run(&side, side.pieces())?;
     Ok(Certificate {
@@ -263,21 +268,6 @@ struct SurfaceSide<'a> {
 }
 
 impl SurfaceSide<'_> {
-    pub fn pieces(&self, surface: &TriMesh) -> Vec<[Vec3; 3]> {
-        (0..surface.faces.len()).map(|face| surface.triangle(face)).collect()
-    }
-
-    /// The farthest of some points of the surface, the first of equally far ones, and its distance.
-    pub fn farthest_of(&self, points: &[Vec3]) -> (f64, Vec3) {
-        let mut farthest = (0.0, points[0]);
-        for (signed, &point) in self.union.signed_batch(points).into_iter().zip(points) {
-            if signed.abs() > farthest.0 {
-                farthest = (signed.abs(), point);
-            }
-        }
-        farthest
-    }
-
     /// An upper bound of `sigma` over a triangle: the best one from the primitives that are deepest at
     /// the centre or at a corner.
     fn above(&self, triangle: &[Vec3; 3], enough: f64, first: f64) -> f64 {

@@ -26,7 +26,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Distances;
-use super::ascent::{OnMesh, OnUnion, Start, Summit, ascend};
+use super::ascent::{OnMesh, OnUnion, Peak, Start, ascend};
 use super::envelope::{EnvelopeOptions, sample_envelope_along};
 use super::samples::{SEEDS, SurfaceSamples};
 use crate::Vec3;
@@ -187,9 +187,9 @@ pub(super) fn distances_with_envelope(
 
 impl Envelope {
     /// Adds points that count for the maximum but not for the mean.
-    fn extend(&mut self, peaks: Vec<Summit>) {
+    fn extend(&mut self, peaks: Vec<Peak>) {
         self.points.extend(peaks.iter().map(|peak| peak.point));
-        self.distances.extend(peaks.iter().map(|peak| peak.value));
+        self.distances.extend(peaks.iter().map(|peak| peak.distance));
     }
 }
 
@@ -200,7 +200,7 @@ pub(super) fn highest(
     value: impl Fn(Vec3, &mut usize) -> f64 + Sync,
 ) -> f64 {
     let peaks = ascend(&OnMesh { mesh, value }, start);
-    let peaks: Vec<f64> = peaks.iter().map(|peak| peak.value).collect();
+    let peaks: Vec<f64> = peaks.iter().map(|peak| peak.distance).collect();
     largest(&[largest(start.values), largest(&peaks)])
 }
 

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use rayon::prelude::*;
 
 use super::mesh::{Normalisation, TriMesh, Unit};
+use super::read::PolygonSoup;
 use super::repair::Repaired;
 use super::report::{Fault, SurfaceReport, VertexName, counted};
 use super::topology::{self, Shell, Topology};
@@ -95,28 +96,15 @@ pub(super) fn examine_unrepaired(mesh: &TriMesh) -> Result<SurfaceReport, Fault>
 /// Checks what repairs guarantee for files: finite coordinates, valid and distinct corners, no
 /// repeated face, no vertex without a face.
 fn check_indices(mesh: &TriMesh) -> Result<(), Fault> {
-    use super::report::Place;
     let vertices = mesh.vertices.len();
-    for (vertex, position) in mesh.vertices.iter().enumerate() {
-        if let Some(value) = position.to_array().into_iter().find(|x| !x.is_finite()) {
-            return Err(Fault::Coordinate { at: Place::Element("vertex", vertex), vertex, value });
-        }
-    }
+    // Coordinates and indices, as for arrays.
+    PolygonSoup::of_triangles(&mesh.vertices, &mesh.faces)?;
     let mut used = vec![false; vertices];
-    for (face, corners) in mesh.faces.iter().enumerate() {
-        let &[a, b, c] = corners;
+    for (face, &[a, b, c]) in mesh.faces.iter().enumerate() {
         if a == b || b == c || c == a {
             return Err(Fault::RepeatedCorner { face });
         }
-        for &vertex in corners {
-            let slot = used.get_mut(vertex as usize).ok_or(Fault::Index {
-                at: Place::Element("face", face),
-                face,
-                index: vertex.into(),
-                vertices,
-            })?;
-            *slot = true;
-        }
+        [a, b, c].iter().for_each(|&vertex| used[vertex as usize] = true);
     }
     if mesh.faces.is_empty() {
         return Err(Fault::NoFaces { vertices });

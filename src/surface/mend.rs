@@ -12,7 +12,6 @@ use super::report::{Fault, Repair, VertexName};
 use super::topology::Topology;
 use super::{Format, Loaded, SurfaceError, TriMesh, accept, examine, in_file};
 use crate::Vec3;
-use crate::geometry::DisjointSets;
 
 /// Which parts of a surface are kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -406,27 +405,10 @@ pub(super) fn separate(vertices: &mut Vec<Vec3>, faces: &mut [[u32; 3]]) -> Opti
 
 /// For each vertex its fans, by their first corner.
 fn fans(vertices: usize, faces: &[[u32; 3]]) -> Vec<BTreeMap<u32, Fan>> {
-    let mut joined = DisjointSets::singletons(3 * faces.len());
-    // Both ends of each side with the corners there, so that equal sides stand together.
-    let mut sides: Vec<([u32; 2], [u32; 2])> = Vec::with_capacity(3 * faces.len());
-    for (face, corners) in (0..).zip(faces) {
-        for k in 0..3 {
-            let next = (k + 1) % 3;
-            let ends = [(corners[k], 3 * face + k as u32), (corners[next], 3 * face + next as u32)];
-            let [low, high] = if ends[0] < ends[1] { ends } else { [ends[1], ends[0]] };
-            sides.push(([low.0, high.0], [low.1, high.1]));
-        }
-    }
-    sides.sort_unstable();
-    for pair in sides.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
-        for end in 0..2 {
-            joined.join(pair[0].1[end], pair[1].1[end]);
-        }
-    }
+    let fan_of = Topology::new(vertices, faces).fan;
     let mut fans = vec![BTreeMap::<u32, Fan>::new(); vertices];
-    for (corner, &vertex) in faces.as_flattened().iter().enumerate() {
-        let fan = fans[vertex as usize].entry(joined.find(corner as u32)).or_default();
-        fan.push(corner);
+    for ((corner, &vertex), fan) in faces.as_flattened().iter().enumerate().zip(fan_of) {
+        fans[vertex as usize].entry(fan).or_default().push(corner);
     }
     fans
 }

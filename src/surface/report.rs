@@ -8,24 +8,14 @@ use serde::{Deserialize, Serialize};
 use crate::Vec3;
 
 /// A surface that could not be read or may not be used, and why.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{}{fault}", file.as_ref().map_or(String::new(), |file| format!("{}: ", file.display())))]
 pub struct SurfaceError {
     /// The file, where there is one.
     pub file: Option<PathBuf>,
     /// The defect.
     pub fault: Fault,
 }
-
-impl fmt::Display for SurfaceError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(file) = &self.file {
-            write!(f, "{}: ", file.display())?;
-        }
-        self.fault.fmt(f)
-    }
-}
-
-impl std::error::Error for SurfaceError {}
 
 impl From<Fault> for SurfaceError {
     fn from(fault: Fault) -> Self {

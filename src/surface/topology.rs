@@ -35,6 +35,9 @@ pub(super) struct Topology {
     pub component: Vec<u32>,
     /// First face of each component.
     pub first_face: Vec<u32>,
+    /// For each corner (`3 face + k`) the first one of its *fan*, the faces that hang together around
+    /// the corner's vertex.
+    pub fan: Vec<u32>,
 }
 
 /// No half-edge.
@@ -47,7 +50,8 @@ impl Topology {
         let mut fans = DisjointSets::singletons(3 * faces.len());
         let mut parts = DisjointSets::singletons(faces.len());
         topology.pair_half_edges(faces, &mut fans, &mut parts);
-        topology.count_fans(vertices, faces, &mut fans);
+        topology.fan = (0..3 * faces.len() as u32).map(|corner| fans.find(corner)).collect();
+        topology.count_fans(vertices, faces);
         topology.number_components(faces.len(), &mut parts);
         topology
     }
@@ -102,11 +106,10 @@ impl Topology {
         }
     }
 
-    fn count_fans(&mut self, vertices: usize, faces: &[[u32; 3]], fans: &mut DisjointSets) {
+    fn count_fans(&mut self, vertices: usize, faces: &[[u32; 3]]) {
         const SEVERAL: u32 = u32::MAX - 1;
         let mut fan_of = vec![NONE; vertices];
-        for (corner, &vertex) in faces.as_flattened().iter().enumerate() {
-            let fan = fans.find(corner as u32);
+        for (&fan, &vertex) in self.fan.iter().zip(faces.as_flattened()) {
             let known = &mut fan_of[vertex as usize];
             if *known == NONE {
                 *known = fan;

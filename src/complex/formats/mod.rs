@@ -87,6 +87,7 @@ pub enum Radii {
 
 /// Why a file could not be read or written as a medial mesh: the file, the line, the reason.
 #[derive(Debug, thiserror::Error)]
+#[error("{file}{}: {kind}", line.map_or(String::new(), |line| format!(", line {line}")))]
 pub struct MaError {
     /// The file's name as it was given.
     pub file: String,
@@ -94,15 +95,6 @@ pub struct MaError {
     pub line: Option<usize>,
     /// The reason.
     pub kind: MaErrorKind,
-}
-
-impl fmt::Display for MaError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.line {
-            Some(line) => write!(f, "{}, line {line}: {}", self.file, self.kind),
-            None => write!(f, "{}: {}", self.file, self.kind),
-        }
-    }
 }
 
 impl MaError {
