@@ -44,7 +44,7 @@ fn medial(loaded: &LoadedMa) {
 }
 
 fn ma_with(bytes: &[u8], options: ReadOptions) {
-    if let Ok(loaded) = complex::parse_ma_with(bytes, "x.ma", options) {
+    if let Ok(loaded) = complex::parse_ma(bytes, "x.ma", options) {
         medial(&loaded);
     }
 }
@@ -65,7 +65,7 @@ pub(crate) fn ma_points(bytes: &[u8]) {
 pub(crate) fn medial_ply(bytes: &[u8]) {
     for radii in [Radii::Needed, Radii::NotNeeded] {
         let options = ReadOptions { radii, ..ReadOptions::default() };
-        if let Ok(loaded) = complex::parse_ply_with(bytes, "x.ply", options) {
+        if let Ok(loaded) = complex::parse_ply(bytes, "x.ply", options) {
             medial(&loaded);
         }
     }

@@ -77,6 +77,15 @@ struct Store {
     normalisation: Normalisation,
     report: SurfaceReport,
     options: ShapeOptions,
+    of_samples: OfSamples,
+    of_surface: Arc<OfSurface>,
+}
+
+/// The part that depends on the samples.
+#[derive(Default)]
+struct OfSamples {
+    /// Whether it is no substrate that methods share, but the work of the method that asked for it.
+    is_of_asker: bool,
     samples: Cache<Sampling, Arc<[Vec3]>>,
     /// Defects that [`Sampling::Auto`] could not mend.
     unmended: OnceLock<String>,
@@ -85,7 +94,6 @@ struct Store {
     facets: Cache<Sampling, Arc<VoronoiFacets>>,
     medial: Cache<Sampling, Arc<MedialMesh>>,
     balls: Cache<Sampling, Arc<InnerBalls>>,
-    of_surface: Arc<OfSurface>,
 }
 
 /// The part that does not depend on the samples.
@@ -119,13 +127,7 @@ impl Shape {
             normalisation,
             report,
             options,
-            samples: Cache::default(),
-            unmended: OnceLock::new(),
-            delaunay: Cache::default(),
-            cells: Cache::default(),
-            facets: Cache::default(),
-            medial: Cache::default(),
-            balls: Cache::default(),
+            of_samples: OfSamples::default(),
             of_surface: Arc::default(),
         };
         Ok(Self { store: Arc::new(store), used: Arc::default(), given: None })
@@ -156,14 +158,8 @@ impl Shape {
             normalisation: *normalisation,
             report: report.clone(),
             options: ShapeOptions { sampling, ..options.clone() },
-            samples: Cache::of_asker(),
-            delaunay: Cache::of_asker(),
-            cells: Cache::of_asker(),
-            facets: Cache::of_asker(),
-            medial: Cache::of_asker(),
-            balls: Cache::of_asker(),
+            of_samples: OfSamples { is_of_asker: true, ..OfSamples::default() },
             of_surface: Arc::clone(of_surface),
-            unmended: OnceLock::new(),
         };
         Self { store: Arc::new(store), used: Arc::default(), given: None }
     }
@@ -385,8 +381,6 @@ pub(super) struct Use {
 
 /// Values that are built once for each key, with what building them cost.
 pub(super) struct Cache<K, T> {
-    /// Whether what building needs of the heap is part of the work that asked for it.
-    is_of_asker: bool,
     /// Looked up by key only, never iterated.
     slots: Mutex<HashMap<K, Arc<Slot<T>>>>,
 }
@@ -395,22 +389,17 @@ type Slot<T> = OnceLock<(Result<T, ShapeError>, Cost)>;
 
 impl<K, T> Default for Cache<K, T> {
     fn default() -> Self {
-        Self { is_of_asker: false, slots: Mutex::default() }
-    }
-}
-
-impl<K, T> Cache<K, T> {
-    /// A cache of what is no substrate that methods share, but one method's own work.
-    pub fn of_asker() -> Self {
-        Self { is_of_asker: true, ..Self::default() }
+        Self { slots: Mutex::default() }
     }
 }
 
 impl<K: Eq + Hash, T: Clone> Cache<K, T> {
-    /// The value for a key; a second asker waits for the first.
+    /// The value for a key; a second asker waits for the first. `is_of_asker`: what building needs of
+    /// the heap is part of the work that asked for it.
     pub fn get(
         &self,
         key: K,
+        is_of_asker: bool,
         build: impl FnOnce() -> Result<T, ShapeError>,
     ) -> (Result<T, ShapeError>, Use) {
         let slot =
@@ -419,7 +408,7 @@ impl<K: Eq + Hash, T: Clone> Cache<K, T> {
         let (value, cost) = slot
             .get_or_init(|| {
                 built_here = true;
-                if self.is_of_asker { Cost::of(build) } else { Cost::of_substrate(build) }
+                if is_of_asker { Cost::of(build) } else { Cost::of_substrate(build) }
             })
             .clone();
         (value, Use { cost, built_here })
@@ -441,11 +430,22 @@ impl Shape {
             Sampling::Auto => self.surface_tree().ok().zip(Some(self.inside_test())),
             _ => None,
         };
-        let built = self.store.samples.get(*sampling, || {
+        let of_samples = &self.store.of_samples;
+        let built = of_samples.samples.get(*sampling, of_samples.is_of_asker, || {
             let refined = refined.and_then(|(tree, inside)| self.refined(&tree, &inside));
             Ok(refined.unwrap_or_else(|| sample(&self.store.mesh, sampling).into()))
         });
         self.take(Substrate::Samples, built).expect("sampling cannot fail")
+    }
+
+    /// A substrate of the shape's own sampling.
+    fn built<T: Clone>(
+        &self,
+        cache: impl FnOnce(&OfSamples) -> &Cache<Sampling, T>,
+        build: impl FnOnce() -> Result<T, ShapeError>,
+    ) -> (Result<T, ShapeError>, Use) {
+        let Store { of_samples, options, .. } = &*self.store;
+        cache(of_samples).get(options.sampling, of_samples.is_of_asker, build)
     }
 
     /// The samples of [`Sampling::Auto`]; none where the vertices do not span space, which
@@ -456,7 +456,7 @@ impl Shape {
         let refined = Refinement { mesh, tree, inside, expected, dual }.run().ok()?;
         if let Some(warning) = refined.warning() {
             // The first: another view that builds the same samples says the same.
-            let _ = self.store.unmended.set(warning);
+            let _ = self.store.of_samples.unmended.set(warning);
         }
         Some(refined.samples.into())
     }
@@ -464,7 +464,7 @@ impl Shape {
     /// What is wrong with the medial mesh of the samples all the same, where [`Sampling::Auto`] reached
     /// one of its limits; once they are built.
     pub fn sampling_warning(&self) -> Option<&str> {
-        self.store.unmended.get().map(String::as_str)
+        self.store.of_samples.unmended.get().map(String::as_str)
     }
 
     /// The Delaunay triangulation of the boundary samples.
@@ -473,9 +473,10 @@ impl Shape {
     /// When the samples do not span space.
     pub fn delaunay(&self) -> Result<Arc<Delaunay>, ShapeError> {
         let samples = self.samples();
-        let built = self.store.delaunay.get(self.store.options.sampling, || {
-            Delaunay::new(&samples).map(Arc::new).map_err(ShapeError::from)
-        });
+        let built = self.built(
+            |of_samples| &of_samples.delaunay,
+            || Delaunay::new(&samples).map(Arc::new).map_err(ShapeError::from),
+        );
         self.take(Substrate::Delaunay, built)
     }
 
@@ -487,9 +488,10 @@ impl Shape {
         let delaunay = self.delaunay()?;
         let tree = self.surface_tree()?;
         let inside = self.inside_test();
-        let built = self.store.cells.get(self.store.options.sampling, || {
-            Ok(Arc::new(CellSpheres::classify(&delaunay, &inside, &tree)))
-        });
+        let built = self.built(
+            |of_samples| &of_samples.cells,
+            || Ok(Arc::new(CellSpheres::classify(&delaunay, &inside, &tree))),
+        );
         self.take(Substrate::Inside, built)
     }
 
@@ -500,9 +502,10 @@ impl Shape {
     pub fn facets(&self) -> Result<Arc<VoronoiFacets>, ShapeError> {
         let delaunay = self.delaunay()?;
         let cells = self.cells()?;
-        let built = self.store.facets.get(self.store.options.sampling, || {
-            Ok(Arc::new(VoronoiFacets::new(&delaunay, &cells)))
-        });
+        let built = self.built(
+            |of_samples| &of_samples.facets,
+            || Ok(Arc::new(VoronoiFacets::new(&delaunay, &cells))),
+        );
         self.take(Substrate::Facets, built)
     }
 
@@ -514,15 +517,17 @@ impl Shape {
         let delaunay = self.delaunay()?;
         let cells = self.cells()?;
         let facets = self.facets()?;
-        let options = &self.store.options;
-        let built = self.store.medial.get(options.sampling, || {
-            let samples = self.samples();
-            let mesh = voronoi_medial_mesh(&delaunay, &cells, &facets, &samples, options.dual);
-            if mesh.spheres.is_empty() {
-                return Err(ShapeError::of_nothing_inside(&cells));
-            }
-            Ok(Arc::new(mesh))
-        });
+        let built = self.built(
+            |of_samples| &of_samples.medial,
+            || {
+                let (samples, dual) = (self.samples(), self.store.options.dual);
+                let mesh = voronoi_medial_mesh(&delaunay, &cells, &facets, &samples, dual);
+                if mesh.spheres.is_empty() {
+                    return Err(ShapeError::of_nothing_inside(&cells));
+                }
+                Ok(Arc::new(mesh))
+            },
+        );
         self.take(Substrate::MedialMesh, built)
     }
 
@@ -538,13 +543,16 @@ impl Shape {
         }
         let delaunay = self.delaunay()?;
         let cells = self.cells()?;
-        let built = self.store.balls.get(self.store.options.sampling, || {
-            let balls = InnerBalls::of_poles(&delaunay, &cells, &self.samples());
-            if balls.spheres.is_empty() {
-                return Err(ShapeError::of_nothing_inside(&cells));
-            }
-            Ok(Arc::new(balls))
-        });
+        let built = self.built(
+            |of_samples| &of_samples.balls,
+            || {
+                let balls = InnerBalls::of_poles(&delaunay, &cells, &self.samples());
+                if balls.spheres.is_empty() {
+                    return Err(ShapeError::of_nothing_inside(&cells));
+                }
+                Ok(Arc::new(balls))
+            },
+        );
         self.take(Substrate::Poles, built)
     }
 
@@ -595,21 +603,15 @@ impl Shape {
     /// # Errors
     /// When the surface has no face.
     pub fn surface_tree(&self) -> Result<Arc<TriangleBvh>, ShapeError> {
-        let built = self
-            .store
-            .of_surface
-            .tree
-            .get((), || Ok(Arc::new(TriangleBvh::new(&self.store.mesh)?)));
+        let Store { mesh, of_surface, .. } = &*self.store;
+        let built = of_surface.tree.get((), false, || Ok(Arc::new(TriangleBvh::new(mesh)?)));
         self.take(Substrate::SurfaceTree, built)
     }
 
     /// The inside test of the surface.
     pub fn inside_test(&self) -> Arc<InsideTest> {
-        let built = self
-            .store
-            .of_surface
-            .inside
-            .get((), || Ok(Arc::new(InsideTest::new(&self.store.mesh))));
+        let Store { mesh, of_surface, .. } = &*self.store;
+        let built = of_surface.inside.get((), false, || Ok(Arc::new(InsideTest::new(mesh))));
         self.take(Substrate::InsideTest, built).expect("a test of any mesh can be built")
     }
 

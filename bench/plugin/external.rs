@@ -254,7 +254,7 @@ impl PreparedProgram<'_> {
             Err(error) => return invalid(format!("the file at {{output}}: {error}")),
         };
         let strict = ReadOptions { radii: Radii::NotNegative, ..ReadOptions::default() };
-        let mut loaded = match complex::parse_ma_with(bytes, "", strict) {
+        let mut loaded = match complex::parse_ma(bytes, "", strict) {
             Ok(loaded) => loaded,
             Err(error) => {
                 // The file's name is a temporary one and says nothing.

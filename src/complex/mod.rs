@@ -11,9 +11,8 @@ mod voronoi;
 
 pub use contour::{ContourError, UnionSurface, union_surface, union_surface_while};
 pub use formats::{
-    LoadedMa, Look, MaError, MaErrorKind, Radii, ReadOptions, SphereValues, parse_ma,
-    parse_ma_with, parse_obj, parse_ply, parse_ply_with, read, read_content, read_with,
-    single_precision_loss, write, write_with,
+    LoadedMa, Look, MaError, MaErrorKind, Radii, ReadOptions, SphereValues, parse_ma, parse_obj,
+    parse_ply, read, read_content, read_with, single_precision_loss, write, write_with,
 };
 pub use mesh::Incidence;
 pub use mesh::{ComplexError, Contacts, MedialMesh};

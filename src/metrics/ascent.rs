@@ -189,11 +189,19 @@ impl Start<'_> {
 
 /// The corners of an icosahedron, turned differently in each round.
 fn directions(pose: &Pose, round: usize) -> [Vec3; 12] {
-    const GOLDEN: f64 = 1.618_033_988_749_895;
     // Not a simple fraction of a turn, nor an axis of symmetry: no direction repeats.
     let axis = Vec3::new(0.267_261, 0.534_522, 0.801_784).normalize();
     let turn = glam::DQuat::from_axis_angle(axis, 2.399_963_2 * (round as f64 + 0.3));
     let [x, y, z] = pose.axes();
+    icosahedron().map(|corner| {
+        let d = turn * corner;
+        d.x * x + d.y * y + d.z * z
+    })
+}
+
+/// Twelve unit vectors, towards the corners of an icosahedron.
+pub(crate) fn icosahedron() -> [Vec3; 12] {
+    const GOLDEN: f64 = 1.618_033_988_749_895;
     std::array::from_fn(|k| {
         let sign = |bit: usize| if k >> bit & 1 == 0 { 1.0 } else { -1.0 };
         let (short, long) = (sign(0), sign(1) * GOLDEN);
@@ -202,8 +210,7 @@ fn directions(pose: &Pose, round: usize) -> [Vec3; 12] {
             1 => Vec3::new(short, long, 0.0),
             _ => Vec3::new(long, 0.0, short),
         };
-        let d = turn * corner.normalize();
-        d.x * x + d.y * y + d.z * z
+        corner.normalize()
     })
 }
 

@@ -37,6 +37,7 @@ use crate::complex::{
 };
 use crate::geometry::trees::PointTree;
 use crate::geometry::{Delaunay, TriangulationError};
+use crate::metrics::icosahedron;
 use crate::surface::{InsideTest, Sampling, Side, TriMesh, TriangleBvh, sample};
 
 /// The error that is allowed, as a fraction of the bounding box's diagonal.
@@ -286,8 +287,9 @@ impl Refinement<'_> {
             }
             if distance(point) < CLEAR * clear {
                 // Occupied: of the points around, the one farthest from all samples.
-                let around = directions().map(|d| self.tree.closest(point + clear * d).point);
+                let around = icosahedron().map(|d| self.tree.closest(point + clear * d).point);
                 point = around
+                    .into_iter()
                     .max_by(|a: &Vec3, b: &Vec3| distance(*a).total_cmp(&distance(*b)))
                     .unwrap_or(point);
             }
@@ -373,21 +375,6 @@ fn mean_ball(medial: &MedialMesh, corners: &[u32]) -> (Vec3, f64) {
         (centre + ball.centre, radius + ball.radius)
     });
     (centre * share, radius * share)
-}
-
-/// Twelve directions, those of the corners of an icosahedron.
-fn directions() -> impl Iterator<Item = Vec3> {
-    const GOLDEN: f64 = 1.618_033_988_749_895;
-    (0..12).map(|k| {
-        let short = if k & 1 == 0 { 1.0 } else { -1.0 };
-        let long = if k & 2 == 0 { GOLDEN } else { -GOLDEN };
-        let corner = match k / 4 {
-            0 => Vec3::new(0.0, short, long),
-            1 => Vec3::new(short, long, 0.0),
-            _ => Vec3::new(long, 0.0, short),
-        };
-        corner.normalize()
-    })
 }
 
 // Nearest-point queries on a growing set of points.

@@ -42,8 +42,10 @@ use crate::complex::{MedialMesh, Sphere};
 /// taken. [`LoadedMa::notes`] and [`LoadedMa::warnings`] list the changes.
 ///
 /// ```
+/// use medial::complex::{ReadOptions, parse_ma};
+///
 /// let text = "3 0 1\nv 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 0 1 2\n";
-/// let loaded = medial::complex::parse_ma(text, "triangle.ma")?;
+/// let loaded = parse_ma(text, "triangle.ma", ReadOptions::default())?;
 /// assert_eq!(loaded.mesh.edges, [[0, 1], [0, 2], [1, 2]]);
 /// assert_eq!(loaded.notes, ["3 edges were added: sides of faces that were not listed"]);
 /// # Ok::<(), medial::complex::MaError>(())
@@ -52,17 +54,9 @@ use crate::complex::{MedialMesh, Sphere};
 /// # Errors
 /// When the header or a line is not as above, a number is not finite, an
 /// index is out of range, trailing words are the flags of no known tool, the lines are not as
-/// many as announced (but for edges and faces of a writer that is known to miscount them), or a second medial mesh was
-/// appended.
-pub fn parse_ma(text: impl AsRef<[u8]>, name: &str) -> Result<LoadedMa, MaError> {
-    parse_ma_with(text, name, ReadOptions::default())
-}
-
-/// [`parse_ma`] for files that are not what their header says, hold several medial meshes, or no radii.
-///
-/// # Errors
-/// As [`parse_ma`], but for what the options allow, and when there is no such block.
-pub fn parse_ma_with(
+/// many as announced (but for edges and faces of a writer that is known to miscount them), a second medial mesh was
+/// appended, or the file has no such block; but for what the options allow.
+pub fn parse_ma(
     text: impl AsRef<[u8]>,
     name: &str,
     options: ReadOptions,

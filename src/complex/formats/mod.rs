@@ -22,8 +22,8 @@ use std::io;
 use std::path::Path;
 
 pub use glb::single_precision_loss;
-pub use ma::{parse_ma, parse_ma_with, parse_obj};
-pub use viewers::{Look, SphereValues, parse_ply, parse_ply_with};
+pub use ma::{parse_ma, parse_obj};
+pub use viewers::{Look, SphereValues, parse_ply};
 
 use super::{ComplexError, MedialMesh};
 use crate::atomic::write_atomically;
@@ -52,12 +52,12 @@ impl LoadedMa {
 /// How to read files that are not what their header says, or hold more or less than one medial mesh.
 ///
 /// ```
-/// use medial::complex::{ReadOptions, parse_ma_with};
+/// use medial::complex::{ReadOptions, parse_ma};
 ///
 /// let short = "3 0 0\nv 0 0 0 1\nv 1 0 0 1\n";
-/// assert!(parse_ma_with(short, "short.ma", ReadOptions::default()).is_err());
+/// assert!(parse_ma(short, "short.ma", ReadOptions::default()).is_err());
 /// let lenient = ReadOptions { lenient: true, ..ReadOptions::default() };
-/// let loaded = parse_ma_with(short, "short.ma", lenient)?;
+/// let loaded = parse_ma(short, "short.ma", lenient)?;
 /// assert_eq!((loaded.mesh.spheres.len(), loaded.warnings.len()), (2, 1));
 /// # Ok::<(), medial::complex::MaError>(())
 /// ```
@@ -163,8 +163,8 @@ type Parser<'a> = fn(&'a [u8], &str, ReadOptions) -> Result<LoadedMa, MaError>;
 
 fn parser<'a>(path: &Path) -> Result<Parser<'a>, MaError> {
     match extension(path).as_str() {
-        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => Ok(parse_ma_with),
-        "ply" => Ok(parse_ply_with),
+        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => Ok(parse_ma),
+        "ply" => Ok(parse_ply),
         "obj" => Ok(parse_obj),
         other => {
             let known = ".ma, .ma_dup, .sph, .txt, .xyzr, .ply, .obj";

@@ -18,7 +18,8 @@ const POINTS: ReadOptions = ReadOptions { lenient: false, block: None, radii: Ra
 const STRICT: ReadOptions = ReadOptions { lenient: false, block: None, radii: Radii::NotNegative };
 
 fn load(text: &str) -> LoadedMa {
-    parse_ma(text, "x.ma").unwrap_or_else(|error| panic!("{text:?}: {error}"))
+    parse_ma(text, "x.ma", ReadOptions::default())
+        .unwrap_or_else(|error| panic!("{text:?}: {error}"))
 }
 
 fn as_written(mesh: &MedialMesh) -> String {
@@ -132,7 +133,8 @@ fn every_dialect_gives_the_same_bytes_as_the_plain_one() {
     assert_eq!(as_written(&loaded.mesh), plain);
     // N: with `radius` as CGAL has it, and `r`.
     for name in ["radius", "r"] {
-        assert_eq!(as_written(&parse_ply(ply(name), "x.ply").unwrap().mesh), plain);
+        let loaded = parse_ply(ply(name), "x.ply", ReadOptions::default()).unwrap();
+        assert_eq!(as_written(&loaded.mesh), plain);
     }
     // H: all faces of a tetrahedron, over and over.
     let tetrahedra = "4 0 8\nv 0 0 0 1 2 0\nv 1 0 0 1 2 0\nv 0 1 0 1 2 0\nv 0 0 1 1 2 0\nf 0 1 2\nf 0 1 3\n\
@@ -188,8 +190,8 @@ fn wrong_counts_are_taken_with_a_warning_if_lenient() {
         ("5\n0 0 0 1\n1 0 0 1\n".to_owned(), [2, 0, 0]),
         ("1\n0 0 0 1\n1 0 0 1\n".to_owned(), [2, 0, 0]),
     ] {
-        assert!(parse_ma(&text, "x.ma").is_err(), "{text:?}");
-        let loaded = parse_ma_with(&text, "x.ma", LENIENT).unwrap();
+        assert!(parse_ma(&text, "x.ma", ReadOptions::default()).is_err(), "{text:?}");
+        let loaded = parse_ma(&text, "x.ma", LENIENT).unwrap();
         assert_eq!(counts(&loaded.mesh), expected, "{text:?}");
         assert!(loaded.warnings[0].contains("taken as they are"), "{text:?}");
     }
@@ -199,8 +201,7 @@ fn wrong_counts_are_taken_with_a_warning_if_lenient() {
 fn one_of_several_blocks_is_chosen() {
     let second = "1 0 0\nv 5 5 5 5\n";
     let text = format!("{PLAIN}{second}{PLAIN}1\n0 0 1\n0\n");
-    let read =
-        |block| parse_ma_with(&text, "x.ma", ReadOptions { block, ..ReadOptions::default() });
+    let read = |block| parse_ma(&text, "x.ma", ReadOptions { block, ..ReadOptions::default() });
     assert!(read(None).unwrap_err().to_string().starts_with("x.ma, line 9: all that"));
     for (number, alone) in [(1, PLAIN), (2, second), (3, PLAIN)] {
         assert_eq!(read(Some(number)).unwrap().mesh, load(alone).mesh, "{number}");
@@ -249,7 +250,7 @@ fn refuses(parse: Parser, options: ReadOptions, cases: &[(&str, &str)]) {
 fn errors_name_the_line_and_the_reason() {
     let default = ReadOptions::default();
     refuses(
-        parse_ma_with,
+        parse_ma,
         default,
         &[
             ("", ": the file is empty"),
@@ -305,13 +306,9 @@ fn errors_name_the_line_and_the_reason() {
             ("1 0 0\nv 0 0 0 1\n1\n0 3 18446744073709551615\n", ", line 3: expected the parts"),
         ],
     );
-    refuses(
-        parse_ma_with,
-        STRICT,
-        &[("1 0 0\nv 0 0 0 -3\n", ", line 2: the radius -3 is negative")],
-    );
+    refuses(parse_ma, STRICT, &[("1 0 0\nv 0 0 0 -3\n", ", line 2: the radius -3 is negative")]);
     let wrong = PLAIN.replace("3 3 1", "2 3 1").replace("e 1 2", "e 1 7");
-    refuses(parse_ma_with, LENIENT, &[(&wrong, ", line 7: \"7\" is not one of the 3 spheres")]);
+    refuses(parse_ma, LENIENT, &[(&wrong, ", line 7: \"7\" is not one of the 3 spheres")]);
     refuses(
         parse_obj,
         default,
@@ -343,7 +340,7 @@ fn errors_name_the_line_and_the_reason() {
         ("1 0\n3", "1 0.5\n3", ": line 17: 0.5 is not one of the 3 spheres"),
         ("3 0 1 2", "", ": end of file: expected face 0, found nothing more"),
     ] {
-        refuses(parse_ply_with, default, &[(&valid.replacen(from, to, 1), expected)]);
+        refuses(parse_ply, default, &[(&valid.replacen(from, to, 1), expected)]);
     }
     assert!(read("/nonexistent/x.ma").unwrap_err().to_string().starts_with("/nonexistent/x.ma: "));
     for extension in ["off", "vtp", "glb"] {
@@ -359,10 +356,10 @@ fn files_without_radii_are_read_where_none_are_needed() {
     // A surface written as .ma is a list of points, too.
     let surface = "4 0 1\nv 1 2 3 0\nv 1 0 0 0\nv 0 1 0 0\nv 0 0 1 0\nf 0 2 1\n";
     for loaded in [
-        parse_ma_with("3 1\n1 2 3\n", "x.sph", POINTS),
-        parse_ma_with(surface, "x.ma", POINTS),
+        parse_ma("3 1\n1 2 3\n", "x.sph", POINTS),
+        parse_ma(surface, "x.ma", POINTS),
         parse_obj("v 1 2 3\n", "x.obj", POINTS),
-        parse_ply_with(point, "x.ply", POINTS),
+        parse_ply(point, "x.ply", POINTS),
     ] {
         assert_eq!(loaded.unwrap().mesh.spheres[0].centre.to_array(), [1.0, 2.0, 3.0]);
     }
@@ -436,8 +433,8 @@ fn damaged_files_are_refused_or_read_but_never_panic() {
             damaged.push(bytes);
         }
         for bytes in damaged {
-            let loaded = if is_ply { parse_ply(bytes, "x") } else { parse_ma(bytes, "x") };
-            if let Ok(loaded) = loaded {
+            let parse: Parser = if is_ply { parse_ply } else { parse_ma };
+            if let Ok(loaded) = parse(bytes, "x", ReadOptions::default()) {
                 assert_eq!(loaded.mesh.check(), Ok(()));
                 accepted += 1;
             }
@@ -462,7 +459,7 @@ proptest! {
         for [a, b, c] in &faces {
             text += &format!("f {a} {b} {c}\n");
         }
-        let loaded = parse_ma(&text, "x.ma").unwrap();
+        let loaded = load(&text);
         prop_assert_eq!(loaded.mesh.check(), Ok(()));
         for [a, b, c] in faces.into_iter().filter(|[a, b, c]| a != b && b != c && a != c) {
             let mut face = [a, b, c];

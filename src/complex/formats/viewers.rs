@@ -105,15 +105,7 @@ pub struct Look {
 ///
 /// # Errors
 /// As for [`parse_ma`](super::parse_ma).
-pub fn parse_ply(bytes: impl AsRef<[u8]>, name: &str) -> Result<LoadedMa, MaError> {
-    parse_ply_with(bytes, name, ReadOptions::default())
-}
-
-/// [`parse_ply`] for files without radii, too.
-///
-/// # Errors
-/// As [`parse_ply`], but for what the options allow.
-pub fn parse_ply_with(
+pub fn parse_ply(
     bytes: impl AsRef<[u8]>,
     name: &str,
     options: ReadOptions,
