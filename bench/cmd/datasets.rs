@@ -6,8 +6,8 @@ use std::{env, fs};
 
 use clap::{Args, Subcommand};
 use medial::surface;
-use medial_datasets::published::{Published, Set};
 use medial_datasets::published;
+use medial_datasets::published::{Published, Set};
 use serde_json::{Value, json};
 
 use crate::args::{Global, positive};

@@ -95,27 +95,12 @@ struct Described {
     title: String,
     citation: String,
     summary: String,
-    native: Option<DescribedLevel>,
+    native: Option<NativeLevel>,
     sweep: Vec<f64>,
-    params: Vec<DescribedParam>,
+    params: Vec<ParamInfo>,
     published: Option<String>,
     on_request: bool,
     incremental: bool,
-}
-
-#[derive(Deserialize)]
-struct DescribedLevel {
-    name: String,
-    unit: String,
-    larger_is_coarser: bool,
-}
-
-#[derive(Deserialize)]
-struct DescribedParam {
-    name: String,
-    default: String,
-    unit: String,
-    help: String,
 }
 
 impl ClassMethod {
@@ -135,16 +120,11 @@ impl ClassMethod {
 
 impl From<Described> for MethodInfo {
     fn from(described: Described) -> Self {
-        let params = described.params.into_iter();
         let info = Self::new(described.id, described.title)
             .citation(described.citation)
             .summary(described.summary)
-            .params(params.map(|p| ParamInfo::new(p.name, p.default, p.unit, p.help)));
-        let native = described.native.map(|level| match level.larger_is_coarser {
-            true => NativeLevel::larger_is_coarser(level.name, level.unit),
-            false => NativeLevel::larger_is_finer(level.name, level.unit),
-        });
-        let incremental = described.incremental;
+            .params(described.params);
+        let (native, incremental) = (described.native, described.incremental);
         let info = Self { native, incremental, ..info };
         match described.published {
             Some(published) => info.published(published),

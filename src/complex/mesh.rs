@@ -143,7 +143,7 @@ impl MedialMesh {
         check_order("edge", &self.edges)?;
         check_order("face", &self.faces)?;
         // Edges are sorted by now, so those of a sphere are a short run.
-        let first = run_starts(&self.edges, spheres);
+        let first = run_starts(self.edges.iter().map(|edge| edge[0]), spheres);
         let missing = self.faces.par_iter().enumerate().find_map_first(|(face, corners)| {
             let mut sides = sides(corners).into_iter();
             let side = sides.find(|&side| edge_id(&self.edges, &first, side).is_none())?;
@@ -260,14 +260,15 @@ fn sides(face: &[u32; 3]) -> [[u32; 2]; 3] {
     [[a, b], [a, c], [b, c]]
 }
 
-/// For each sphere the number of simplices that begin at a smaller one, then the number of all.
-fn run_starts<const N: usize>(simplices: &[[u32; N]], spheres: usize) -> Vec<u32> {
-    let mut start = vec![0; spheres + 1];
-    for simplex in simplices {
-        start[simplex[0] as usize + 1] += 1;
+/// Where the run of each id below `count` starts in a list that is sorted by ids: the number of smaller
+/// ones, then the number of all.
+pub(super) fn run_starts(ids: impl Iterator<Item = u32>, count: usize) -> Vec<u32> {
+    let mut start = vec![0; count + 1];
+    for id in ids {
+        start[id as usize + 1] += 1;
     }
-    for sphere in 0..spheres {
-        start[sphere + 1] += start[sphere];
+    for id in 0..count {
+        start[id + 1] += start[id];
     }
     start
 }
@@ -332,7 +333,7 @@ impl Incidence {
     /// # Panics
     /// If a side of a face is not listed as an edge; see [`MedialMesh::check`].
     pub fn of(mesh: &MedialMesh) -> Self {
-        let first = run_starts(&mesh.edges, mesh.spheres.len());
+        let first = run_starts(mesh.edges.iter().map(|edge| edge[0]), mesh.spheres.len());
         let face_edges: Vec<[u32; 3]> = mesh
             .faces
             .iter()

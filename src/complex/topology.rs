@@ -624,7 +624,7 @@ mod tests {
     }
 
     #[test]
-    fn agrees_with_counting_cells_and_flooding() {
+    fn agrees_with_counting_cells_and_pairs() {
         let mut state = 1_u64;
         for density in [10, 30, 50, 70, 90] {
             for _ in 0..20 {
@@ -641,7 +641,7 @@ mod tests {
         }
     }
 
-    /// Cells at doubled coordinates in a dense array, components by flooding.
+    /// Cells at doubled coordinates in a dense array, components by all pairs.
     fn by_cells(voxels: &[[u32; 3]]) -> [u64; 3] {
         const N: usize = 8;
         let mut cells = vec![false; (2 * N + 1).pow(3)];
@@ -661,36 +661,21 @@ mod tests {
             let dimension = (k % n) % 2 + (k / n % n) % 2 + (k / n / n) % 2;
             chi += if dimension.is_multiple_of(2) { 1 } else { -1 };
         }
-        let flood = |kind: bool, corners: bool| {
-            let mut seen = vec![false; object.len()];
-            let mut components = 0_u64;
-            for start in 0..object.len() {
-                if object[start] != kind || seen[start] {
-                    continue;
-                }
-                components += 1;
-                seen[start] = true;
-                let mut stack = vec![start];
-                while let Some(p) = stack.pop() {
-                    let (x, y, z) = (p % N, p / N % N, p / N / N);
-                    for q in 0..object.len() {
-                        let (u, v, w) = (q % N, q / N % N, q / N / N);
-                        let d = [x.abs_diff(u), y.abs_diff(v), z.abs_diff(w)];
-                        let near = if corners {
-                            d.iter().all(|&d| d <= 1)
-                        } else {
-                            d.iter().sum::<usize>() == 1
-                        };
-                        if near && object[q] == kind && !seen[q] {
-                            seen[q] = true;
-                            stack.push(q);
-                        }
+        let components = |kind: bool, corners: bool| {
+            let members: Vec<usize> = (0..object.len()).filter(|&p| object[p] == kind).collect();
+            let mut sets = DisjointSets::singletons(members.len());
+            for (i, &p) in members.iter().enumerate() {
+                for (j, &q) in members[..i].iter().enumerate() {
+                    let apart = [1, N, N * N].map(|n| (p / n % N).abs_diff(q / n % N));
+                    let most = if corners { 3 } else { 1 };
+                    if apart.iter().all(|&d| d <= 1) && apart.iter().sum::<usize>() <= most {
+                        sets.join(i as u32, j as u32);
                     }
                 }
             }
-            components
+            sets.len() as u64
         };
-        let (b0, b2) = (flood(true, true), flood(false, false) - 1);
+        let (b0, b2) = (components(true, true), components(false, false) - 1);
         [b0, ((b0 + b2) as i64 - chi) as u64, b2]
     }
 }

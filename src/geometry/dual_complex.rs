@@ -241,6 +241,26 @@ impl DualComplex<'_> {
         ids.filter_map(|v| Some((v, self.vertex_class(v)?)))
     }
 
+    /// The triangles of the complex at an edge, in rotational order, each as seen from the cells before
+    /// and after it. They replace `walls`, a buffer that many edges share.
+    pub fn find_walls(&self, (cell, i, j): CellEdge, walls: &mut Vec<[Facet; 2]>) {
+        walls.clear();
+        let ends = self.edge_vertices((cell, i, j));
+        let ring: Vec<CellId> = self.regular.edge_ring(cell, i, j).collect();
+        // A wall is between two consecutive cells of the ring, the last and the first included.
+        for (k, &cell) in ring.iter().enumerate() {
+            let next = ring[(k + 1) % ring.len()];
+            let (v, neighbours) = (self.regular.vertices(cell), self.regular.neighbours(cell));
+            let leads_on =
+                |&opposite: &usize| !ends.contains(&v[opposite]) && neighbours[opposite] == next;
+            let Some(opposite) = (0..4).find(leads_on) else { continue };
+            let before = Facet { cell, opposite };
+            if self.facet_class(before).is_some() {
+                walls.push([before, self.regular.mirror(before)]);
+            }
+        }
+    }
+
     /// The balls at the ends of an edge.
     pub fn edge_vertices(&self, (cell, i, j): CellEdge) -> [VertexId; 2] {
         let v = self.regular.vertices(cell);
@@ -477,11 +497,7 @@ pub(super) fn triangulated(balls: &[Sphere]) -> Result<Regular, TriangulationErr
     let mut points: Vec<Vec3> = balls.iter().map(|b| b.centre).collect();
     let mut weights: Vec<f64> = balls.iter().map(|b| b.radius * b.radius).collect();
     match Regular::new(&points, &weights) {
-        Err(
-            TriangulationError::TooFewPoints { .. }
-            | TriangulationError::Collinear { .. }
-            | TriangulationError::Coplanar { .. },
-        ) => {}
+        Err(error) if error.is_flat() => {}
         result => return result,
     }
     let (anchors, weight) = anchors(&points);

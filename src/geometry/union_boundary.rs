@@ -24,7 +24,7 @@ use rayon::prelude::*;
 
 use crate::Vec3;
 use crate::disjoint::DisjointSets;
-use crate::dual_complex::{CellEdge, Class, DualComplex};
+use crate::dual_complex::{Class, DualComplex};
 use crate::predicates::{
     Sign, Site, orient3d, tetrahedron_size, triangle_clearance, triangle_size,
 };
@@ -177,10 +177,10 @@ pub(super) fn coincident(complex: &DualComplex<'_>, mut sides: Vec<(Facet, u32)>
     let cells = (0..complex.regular().finite_cell_count() as u32).into_par_iter();
     let points: Vec<[Facet; 2]> = cells
         .with_min_len(1 << 10)
-        .map_init(Vec::new, |walls: &mut Vec<Wall>, cell| {
+        .map_init(Vec::new, |walls: &mut Vec<[Facet; 2]>, cell| {
             let mut points = Vec::new();
             for (edge, _) in complex.edges_of(CellId(cell)).filter(|e| e.1 == Class::Regular) {
-                find_walls(complex, edge, walls);
+                complex.find_walls(edge, walls);
                 points.extend(arcs(complex, walls).filter(|&[a, b]| is_point(complex, a, b)));
             }
             points
@@ -206,38 +206,10 @@ pub(super) fn coincident(complex: &DualComplex<'_>, mut sides: Vec<(Facet, u32)>
 /// The gaps between two different triangles at an edge, as these triangles seen from the gap.
 fn arcs<'a>(
     complex: &'a DualComplex<'_>,
-    walls: &'a [Wall],
+    walls: &'a [[Facet; 2]],
 ) -> impl Iterator<Item = [Facet; 2]> + 'a {
-    let pairs = (0..walls.len()).map(|k| [walls[k].after, walls[(k + 1) % walls.len()].before]);
+    let pairs = (0..walls.len()).map(|k| [walls[k][1], walls[(k + 1) % walls.len()][0]]);
     pairs.filter(|[start, _]| walls.len() > 1 && !complex.contains(start.cell))
-}
-
-/// A triangle of the complex at an edge, as seen from the two cells that it separates.
-struct Wall {
-    before: Facet,
-    after: Facet,
-}
-
-/// The triangles of the complex at an edge, in rotational order.
-fn find_walls(complex: &DualComplex<'_>, (cell, i, j): CellEdge, walls: &mut Vec<Wall>) {
-    walls.clear();
-    let regular = complex.regular();
-    let ends = complex.edge_vertices((cell, i, j));
-    let ring: Vec<CellId> = regular.edge_ring(cell, i, j).collect();
-    // A wall stands between two consecutive cells of the ring, the last and the first included.
-    for (k, &cell) in ring.iter().enumerate() {
-        let next = ring[(k + 1) % ring.len()];
-        let v = regular.vertices(cell);
-        let Some(opposite) = (0..4).find(|opposite: &usize| {
-            !ends.contains(&v[*opposite]) && regular.neighbours(cell)[*opposite] == next
-        }) else {
-            continue;
-        };
-        let before = Facet { cell, opposite };
-        if complex.facet_class(before).is_some() {
-            walls.push(Wall { before, after: regular.mirror(before) });
-        }
-    }
 }
 
 /// Whether the arc of the gap between two triangles, both seen from cells in the gap, is a point.

@@ -306,6 +306,7 @@ mod tests {
     use crate::complex::Sphere;
     use crate::metrics::distances;
     use crate::surface::TriMesh;
+    use crate::surface::fixtures::cuboid;
 
     fn square() -> TriMesh {
         let corner = |x, y| Vec3::new(x, y, 0.0);
@@ -373,19 +374,7 @@ mod tests {
 
     #[test]
     fn the_largest_peak_is_the_hausdorff_distance_and_lies_where_it_says() {
-        let corners =
-            [0.0, 1.0].map(|x| [0.0, 1.0].map(|y| [0.0, 1.0].map(|z| Vec3::new(x, y, z))));
-        let vertices: Vec<Vec3> = corners.as_flattened().as_flattened().to_vec();
-        let square = |a, b, c, d| [[a, b, c], [a, c, d]];
-        let sides = [
-            square(0, 1, 3, 2),
-            square(4, 6, 7, 5),
-            square(0, 4, 5, 1),
-            square(2, 3, 7, 6),
-            square(0, 2, 6, 4),
-            square(1, 5, 7, 3),
-        ];
-        let surface = TriMesh { vertices, faces: sides.as_flattened().to_vec() };
+        let surface = cuboid(Vec3::ZERO, Vec3::ONE);
         let tree = TriangleBvh::new(&surface).unwrap();
         let ball = Sphere::new(Vec3::new(0.5, 0.5, 0.4), 0.5);
         let mesh = MedialMesh::from_simplices(vec![ball], vec![], vec![]).unwrap();

@@ -234,7 +234,8 @@ mod tests {
     use crate::Vec3;
     use crate::complex::{MedialUnion, Sphere};
     use crate::metrics::{EnvelopeOptions, sample_envelope};
-    use crate::surface::{TriMesh, TriangleBvh};
+    use crate::surface::TriangleBvh;
+    use crate::surface::fixtures::cuboid;
 
     fn sphere(x: f64, y: f64, z: f64, radius: f64) -> Sphere {
         Sphere::new(Vec3::new(x, y, z), radius)
@@ -416,11 +417,7 @@ mod tests {
 
     #[test]
     fn balls_that_leave_a_box() {
-        let corner = |k: u32| Vec3::from_array([0, 1, 2].map(|b| f64::from(k >> b & 1) - 0.5));
-        let quads =
-            [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-        let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        let surface = TriMesh { vertices: (0..8).map(corner).collect(), faces };
+        let surface = cuboid(Vec3::splat(-0.5), Vec3::splat(0.5));
         let (tree, inside) = (TriangleBvh::new(&surface).unwrap(), InsideTest::new(&surface));
         let options = EnvelopeOptions { samples: 20_000, burial: 1e-9, seed: 0 };
         let of = |spheres: &[(f64, f64)]| {

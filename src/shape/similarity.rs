@@ -389,22 +389,13 @@ fn median(values: &[f64]) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::shape::ShapeOptions;
-    use crate::surface::{TriMesh, validate};
+    use crate::surface::fixtures::cuboid;
+    use crate::surface::validate;
 
     /// A block of 3 by 2 by 1 somewhere, and its initial medial mesh.
     fn block() -> (Shape, MedialMesh) {
-        let quads =
-            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        let mesh = TriMesh {
-            vertices: (0..8)
-                .map(|i: u32| {
-                    let bit = |k: u32| f64::from(i >> k & 1);
-                    Vec3::new(5.0 + 3.0 * bit(0), -4.0 + 2.0 * bit(1), 1.0 + bit(2))
-                })
-                .collect(),
-            faces,
-        };
+        let lower = Vec3::new(5.0, -4.0, 1.0);
+        let mesh = cuboid(lower, lower + Vec3::new(3.0, 2.0, 1.0));
         let report = validate(&mesh).unwrap();
         let sampling = "uniform:4000".parse().unwrap();
         let options = ShapeOptions { sampling, ..ShapeOptions::default() };

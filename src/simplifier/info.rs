@@ -142,7 +142,7 @@ impl NativeLevel {
 }
 
 /// One parameter of a method.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ParamInfo {
     /// Key for `--set key=value`.
     pub name: Text,
@@ -275,14 +275,12 @@ impl Params {
         };
         parse(&self.0).map_err(|message| {
             // Serde does not say which key a wrong value belongs to: the one that fails alone too.
-            let named = match self.0.iter().find(|&(key, value): &(&String, &serde_json::Value)| {
+            let wrong = self.0.iter().find(|&(key, value)| {
                 let alone = serde_json::Map::from_iter([(key.clone(), value.clone())]);
                 parse(&alone).is_err_and(|error| error == message)
-            }) {
-                Some((key, value)) => format!("{key} = {value}: {message}"),
-                None => message,
-            };
-            SimplifyError::Parameter(named)
+            });
+            let at = wrong.map(|(key, value)| format!("{key} = {value}: ")).unwrap_or_default();
+            SimplifyError::Parameter(at + &message)
         })
     }
 }
@@ -301,12 +299,10 @@ pub trait ParamFields: Default + Serialize + DeserializeOwned {
     /// The parameters with their defaults, for [`MethodInfo::params`](crate::simplifier::MethodInfo::params).
     fn describe() -> Vec<ParamInfo> {
         let defaults = serde_json::to_value(Self::default()).expect("parameters are plain data");
-        Self::FIELDS
-            .iter()
-            .map(|&(name, unit, help): &(&'static str, &'static str, &'static str)| {
-                ParamInfo::new(name, as_written(&defaults[name]), unit, help.trim_start())
-            })
-            .collect()
+        let described = Self::FIELDS.iter().map(|&(name, unit, help)| {
+            ParamInfo::new(name, as_written(&defaults[name]), unit, help.trim_start())
+        });
+        described.collect()
     }
 }
 

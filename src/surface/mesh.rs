@@ -216,3 +216,20 @@ mod tests {
         }
     }
 }
+
+#[cfg(test)]
+pub(crate) mod fixtures {
+    use super::{TriMesh, Vec3};
+
+    /// An axis-parallel box of 12 triangles, outward.
+    pub(crate) fn cuboid(lo: Vec3, hi: Vec3) -> TriMesh {
+        let corner = |k: u32| {
+            let at = [0, 1, 2].map(|axis| if k >> axis & 1 == 0 { lo[axis] } else { hi[axis] });
+            Vec3::from(at)
+        };
+        let quads =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        TriMesh { vertices: (0..8).map(corner).collect(), faces }
+    }
+}

@@ -32,6 +32,8 @@ pub use closest::{BvhError, Closest, Feature, TriangleBvh};
 pub use contract::{Contraction, Folds, contract_short_edges, crust_surface};
 pub use inside::{InsideTest, Side, SignedDistance};
 pub use mend::{Components, MendOptions, mend, mend_bytes};
+#[cfg(test)]
+pub(crate) use mesh::fixtures;
 pub use mesh::{Normalisation, TriMesh, write};
 pub use read::Format;
 pub use report::{Fault, Place, Repair, SurfaceError, SurfaceReport, VertexName};

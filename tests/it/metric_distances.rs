@@ -16,10 +16,13 @@ use medial::surface::{InsideTest, TriMesh, TriangleBvh};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
+use crate::nearest::to_triangle;
+
+const OPTIONS: DistanceOptions =
+    DistanceOptions { surface_samples: 20_000, envelope_samples: 20_000, seed: 0 };
+
 fn measure(surface: &TriMesh, mesh: &MedialMesh) -> Distances {
-    let options =
-        DistanceOptions { surface_samples: 20_000, envelope_samples: 20_000, ..Default::default() };
-    distances(surface, &TriangleBvh::new(surface).unwrap(), mesh, &options).unwrap()
+    distances(surface, &TriangleBvh::new(surface).unwrap(), mesh, &OPTIONS).unwrap()
 }
 
 fn complex(spheres: &[(Vec3, f64)], edges: &[[u32; 2]], faces: &[[u32; 3]]) -> MedialMesh {
@@ -348,9 +351,7 @@ fn centred_cuboid(half: Vec3) -> TriMesh {
 }
 
 fn measure_surfaces(surface: &TriMesh, other: &TriMesh) -> SurfaceDistances {
-    let options =
-        DistanceOptions { surface_samples: 20_000, envelope_samples: 20_000, ..Default::default() };
-    surface_distances(surface, &TriangleBvh::new(surface).unwrap(), other, &options).unwrap()
+    surface_distances(surface, &TriangleBvh::new(surface).unwrap(), other, &OPTIONS).unwrap()
 }
 
 #[test]
@@ -370,28 +371,6 @@ fn boxes_in_boxes() {
     let back = measure_surfaces(&outer, &inner);
     assert_eq!((back.forward, back.reverse), (out.reverse, out.forward));
     assert!((back.mean - out.reverse_mean).abs() < 1e-4, "{back:?} {out:?}");
-}
-
-/// Distance from a point to a triangle by descent over a grid of its points: an independent route.
-fn to_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> f64 {
-    let at = |u: f64, v: f64| {
-        let (u, v) = (u.clamp(0.0, 1.0), v.clamp(0.0, 1.0));
-        let (u, v) = if u + v > 1.0 { (u / (u + v), v / (u + v)) } else { (u, v) };
-        (p.distance(a + (b - a) * u + (c - a) * v), u, v)
-    };
-    let mut best = at(1.0 / 3.0, 1.0 / 3.0);
-    let mut step = 0.5;
-    while step > 1e-9 {
-        let around = (-2..=2).flat_map(|i| (-2..=2).map(move |j| (f64::from(i), f64::from(j))));
-        let found = around
-            .map(|(i, j)| at(best.1 + i * step, best.2 + j * step))
-            .fold(best, |x, y| if y.0 < x.0 { y } else { x });
-        if found.0 >= best.0 - 1e-16 {
-            step *= 0.6;
-        }
-        best = found;
-    }
-    best.0
 }
 
 #[test]

@@ -20,35 +20,17 @@ use crate::shapes;
 
 /// A solid without symmetries: a box with bumps, of diagonal 1 or so, 768 triangles.
 fn solid() -> TriMesh {
-    let n = 8_u32;
-    let mut mesh = TriMesh::default();
-    let mut ids = std::collections::BTreeMap::new();
-    let mut id = |at: [u32; 3], mesh: &mut TriMesh| {
-        *ids.entry(at).or_insert_with(|| {
-            let [x, y, z] = at.map(|k| f64::from(k) / f64::from(n) - 0.5);
-            let bump = 1.0 + 0.2 * (3.0 * x + 1.0).sin() * (4.0 * y - 0.5).cos() + 0.1 * z;
-            mesh.vertices.push(bump * Vec3::new(0.7 * x, 0.55 * y, 0.4 * z));
-            mesh.vertices.len() as u32 - 1
-        })
-    };
-    for axis in 0..3 {
-        for side in [0, n] {
-            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-                let at = |i: u32, j: u32| {
-                    let mut at = [side; 3];
-                    at[(axis + 1) % 3] = i;
-                    at[(axis + 2) % 3] = j;
-                    at
-                };
-                let square = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-                let [a, b, c, d] = square.map(|at| id(at, &mut mesh));
-                let faces = [[a, b, c], [a, c, d]];
-                let flip = |[a, b, c]: [u32; 3]| if side == 0 { [a, c, b] } else { [a, b, c] };
-                mesh.faces.extend(faces.map(flip));
-            }
-        }
-    }
-    mesh
+    shapes::moved(shapes::lattice_cube(8), |p| {
+        let Vec3 { x, y, z } = p - 0.5;
+        let bump = 1.0 + 0.2 * (3.0 * x + 1.0).sin() * (4.0 * y - 0.5).cos() + 0.1 * z;
+        bump * Vec3::new(0.7 * x, 0.55 * y, 0.4 * z)
+    })
+}
+
+/// The squares of a grid of `n` by `m` vertices, in two triangles each.
+fn sheet(n: u32, m: u32) -> Vec<[u32; 3]> {
+    let squares = (0..n - 1).flat_map(|i| (0..m - 1).map(move |j| i * m + j));
+    squares.flat_map(|a| [[a, a + m, a + m + 1], [a, a + m + 1, a + 1]]).collect()
 }
 
 /// A medial mesh that is roughly right: sheets, a dangling edge, a lone sphere.
@@ -61,16 +43,9 @@ fn axis(seed: u64) -> MedialMesh {
         let radius = 0.1 + 0.05 * rng.random::<f64>();
         spheres.push(Sphere::new(Vec3::new(0.5 * x, 0.35 * y, 0.0) + jitter, radius));
     }
-    let at = |i: u32, j: u32| 4 * i + j;
-    let squares = (0..4).flat_map(|i| (0..3).map(move |j| (i, j)));
-    let faces = squares.flat_map(|(i, j)| {
-        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-        [[a, b, c], [a, c, d]]
-    });
-    let faces = faces.collect();
     spheres.push(Sphere::new(Vec3::new(0.3, 0.2, 0.1), 0.06));
     spheres.push(Sphere::new(Vec3::new(-0.25, 0.15, 0.08), 0.05));
-    MedialMesh::from_simplices(spheres, vec![[19, 20]], faces).unwrap()
+    MedialMesh::from_simplices(spheres, vec![[19, 20]], sheet(5, 4)).unwrap()
 }
 
 /// A rotation, a scale and a translation.
@@ -295,15 +270,9 @@ fn certified_intervals_meet_when_both_are_moved() {
 
 /// The same complex with its spheres in another order.
 fn renumbered(mesh: &MedialMesh, rng: &mut Pcg64) -> MedialMesh {
-    let mut new: Vec<u32> = (0..mesh.spheres.len() as u32).collect();
-    new.shuffle(rng);
-    let mut spheres = mesh.spheres.clone();
-    for (&to, &sphere) in new.iter().zip(&mesh.spheres) {
-        spheres[to as usize] = sphere;
-    }
-    let edges = mesh.edges.iter().map(|e| e.map(|v| new[v as usize])).collect();
-    let faces = mesh.faces.iter().map(|f| f.map(|v| new[v as usize])).collect();
-    MedialMesh::from_simplices(spheres, edges, faces).unwrap()
+    let mut order: Vec<u32> = (0..mesh.spheres.len() as u32).collect();
+    order.shuffle(rng);
+    mesh.renumbered(&order)
 }
 
 #[test]
@@ -353,13 +322,7 @@ fn cuboid() -> (TriMesh, MedialMesh) {
     };
     let n = 6;
     let grid: Vec<Sphere> = (0..=n).flat_map(|i| (0..=n).map(move |j| flat(i, j, n))).collect();
-    let at = |i: u32, j: u32| i * (n + 1) + j;
-    let squares = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
-    let sheet = squares.flat_map(|(i, j)| {
-        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-        [[a, b, c], [a, c, d]]
-    });
-    let axis = MedialMesh::from_simplices(grid, vec![], sheet.collect()).unwrap();
+    let axis = MedialMesh::from_simplices(grid, vec![], sheet(n + 1, n + 1)).unwrap();
     (shapes::cuboid(-half, half), axis)
 }
 

@@ -56,15 +56,46 @@ pub fn sphere(level: usize) -> TriMesh {
     TriMesh { vertices, faces }
 }
 
+/// The unit cube with `n` by `n` squares of two triangles on each side.
+pub fn lattice_cube(n: u32) -> TriMesh {
+    let mut mesh = TriMesh::default();
+    let mut known = HashMap::new();
+    for axis in 0..3 {
+        for side in [0, n] {
+            for (i, j) in (0..n * n).map(|k| (k % n, k / n)) {
+                let mut quad = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(u, v)| {
+                    let mut p = [0; 3];
+                    (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (side, i + u, j + v);
+                    *known.entry(p).or_insert_with(|| {
+                        mesh.vertices.push(Vec3::from(p.map(f64::from)) / f64::from(n));
+                        mesh.vertices.len() as u32 - 1
+                    })
+                });
+                if side == 0 {
+                    quad.reverse();
+                }
+                let [a, b, c, d] = quad;
+                mesh.faces.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+    }
+    mesh
+}
+
 /// A torus around the z axis with radii 2 and 1.
 pub fn torus(around: u32, along: u32) -> TriMesh {
+    torus_of([2.0, 1.0], around, along)
+}
+
+/// A torus around the z axis with the radii of its circle and of its tube.
+pub fn torus_of([circle, tube]: [f64; 2], around: u32, along: u32) -> TriMesh {
     let mut mesh = TriMesh::default();
     let id = |i: u32, j: u32| (i % around) * along + j % along;
     for (i, j) in (0..around).flat_map(|i| (0..along).map(move |j| (i, j))) {
         let (a, b) =
             (f64::from(i) / f64::from(around) * TAU, f64::from(j) / f64::from(along) * TAU);
-        let r = 2.0 + b.cos();
-        mesh.vertices.push(Vec3::new(r * a.cos(), r * a.sin(), b.sin()));
+        let r = circle + tube * b.cos();
+        mesh.vertices.push(Vec3::new(r * a.cos(), r * a.sin(), tube * b.sin()));
         mesh.faces.push([id(i, j), id(i + 1, j), id(i + 1, j + 1)]);
         mesh.faces.push([id(i, j), id(i + 1, j + 1), id(i, j + 1)]);
     }

@@ -1,33 +1,17 @@
 //! Signed distances against closed forms and the exact inside test.
 
-use std::f64::consts::TAU;
-
 use medial::Vec3;
 use medial::surface::{InsideTest, Side, SignedDistance, TriMesh, TriangleBvh};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
+use crate::shapes::torus_of;
+
 /// Radius of the tube of the tori, around a circle of radius 1.
 const TUBE: f64 = 0.35;
 
-fn torus(n: u32, m: u32) -> TriMesh {
-    let angle = |k: u32, count: u32| TAU * f64::from(k) / f64::from(count);
-    let vertices = (0..n * m)
-        .map(|k| {
-            let (u, v) = (angle(k / m, n), angle(k % m, m));
-            let ring = 1.0 + TUBE * v.cos();
-            Vec3::new(ring * u.cos(), ring * u.sin(), TUBE * v.sin())
-        })
-        .collect();
-    let id = |i: u32, j: u32| i % n * m + j % m;
-    let quads = (0..n).flat_map(|i| (0..m).map(move |j| (i, j)));
-    let faces = quads
-        .flat_map(|(i, j)| {
-            let [a, b, c, d] = [id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1)];
-            [[a, b, c], [a, c, d]]
-        })
-        .collect();
-    TriMesh { vertices, faces }
+fn torus(around: u32, along: u32) -> TriMesh {
+    torus_of([1.0, TUBE], around, along)
 }
 
 fn points(count: usize, seed: u64) -> Vec<Vec3> {

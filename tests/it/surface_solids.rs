@@ -1,7 +1,5 @@
 //! From faces in any order and orientation to solids: orientation, cavities, invariants.
 
-use std::collections::HashMap;
-
 use medial::Vec3;
 use medial::surface::{
     self, Components, Fault, Format, Loaded, MendOptions, Repair, SurfaceError, TriMesh, mend_bytes,
@@ -237,32 +235,7 @@ fn mend(mesh: &TriMesh, options: MendOptions) -> Result<Loaded, SurfaceError> {
 
 /// A lattice box of `n` cells along each side, without the faces that `dropped` names by centroid.
 fn lattice_box(n: u32, dropped: impl Fn(Vec3) -> bool) -> TriMesh {
-    let (mut corners, mut known) = (Vec::new(), HashMap::new());
-    let mut faces = Vec::new();
-    let mut corner = |p: [u32; 3]| {
-        *known.entry(p).or_insert_with(|| {
-            corners.push(Vec3::from(p.map(f64::from)) / f64::from(n));
-            corners.len() as u32 - 1
-        })
-    };
-    for axis in 0..3 {
-        for side in [0, n] {
-            for (i, j) in (0..n * n).map(|k| (k % n, k / n)) {
-                let at = |u: u32, v: u32| {
-                    let mut p = [0; 3];
-                    (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (side, i + u, j + v);
-                    p
-                };
-                let mut quad = [at(0, 0), at(1, 0), at(1, 1), at(0, 1)].map(&mut corner);
-                if side == 0 {
-                    quad.reverse();
-                }
-                let [a, b, c, d] = quad;
-                faces.extend([[a, b, c], [a, c, d]]);
-            }
-        }
-    }
-    let mut mesh = TriMesh { vertices: corners, faces };
+    let mut mesh = lattice_cube(n);
     let centroid = |face: usize| mesh.triangle(face).into_iter().sum::<Vec3>() / 3.0;
     let keep: Vec<bool> = (0..mesh.faces.len()).map(|face| !dropped(centroid(face))).collect();
     let mut keep = keep.iter();

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::{AxisTally, NONE};
 use crate::Vec3;
+use crate::complex::mesh::run_starts;
 use crate::geometry::dual_complex::{CellEdge, Class};
 use crate::geometry::triangulation::Facet;
 use crate::geometry::{
@@ -127,13 +128,7 @@ fn balls_of_corners(
         .collect();
     pairs.par_sort_unstable();
     pairs.dedup();
-    let mut start = vec![0; corners + 1];
-    for pair in &pairs {
-        start[(pair >> 32) as usize + 1] += 1;
-    }
-    for i in 0..corners {
-        start[i + 1] += start[i];
-    }
+    let start = run_starts(pairs.iter().map(|pair| (pair >> 32) as u32), corners);
     (start, pairs.into_iter().map(|pair| pair as u32).collect())
 }
 
@@ -188,11 +183,7 @@ fn same_position(points: &[Vec3]) -> Vec<u32> {
 /// far away that no point among the balls is nearest to one.
 fn spanning(corners: &[Vec3], balls: &[Sphere]) -> Result<Delaunay, TriangulationError> {
     match Delaunay::new(corners) {
-        Err(
-            TriangulationError::TooFewPoints { .. }
-            | TriangulationError::Collinear { .. }
-            | TriangulationError::Coplanar { .. },
-        ) => {}
+        Err(error) if error.is_flat() => {}
         result => return result,
     }
     let [low, high] = bounds(balls);
@@ -417,40 +408,13 @@ pub(super) fn sectors_of(complex: &DualComplex<'_>, corners: &Corners) -> Sector
         complex.edges().filter(|e| e.1 == Class::Regular).map(|e| e.0).collect();
     let chunks = edges.par_iter().with_min_len(1 << 10);
     let found = chunks.map_init(Vec::new, |walls, &edge| {
-        find_walls(complex, edge, walls);
+        complex.find_walls(edge, walls);
         sectors_at(complex, corners, edge, walls)
     });
     let mut sectors: Vec<Sector> = found.flatten_iter().collect();
     sectors.par_sort_unstable();
-    let mut start = vec![0; corners.points().len() + 1];
-    for sector in &sectors {
-        start[sector.corners[0] as usize + 1] += 1;
-    }
-    for i in 0..corners.points().len() {
-        start[i + 1] += start[i];
-    }
+    let start = run_starts(sectors.iter().map(|s| s.corners[0]), corners.points().len());
     Sectors { sectors, start }
-}
-
-/// The triangles of the complex at an edge, in rotational order, as seen from the cells before and
-/// after them.
-fn find_walls(complex: &DualComplex<'_>, (cell, i, j): CellEdge, walls: &mut Vec<[Facet; 2]>) {
-    walls.clear();
-    let regular = complex.regular();
-    let ends = complex.edge_vertices((cell, i, j));
-    let ring: Vec<CellId> = regular.edge_ring(cell, i, j).collect();
-    for (k, &cell) in ring.iter().enumerate() {
-        let next = ring[(k + 1) % ring.len()];
-        let v = regular.vertices(cell);
-        let neighbours = regular.neighbours(cell);
-        let leads_on =
-            |&opposite: &usize| !ends.contains(&v[opposite]) && neighbours[opposite] == next;
-        let Some(opposite) = (0..4).find(leads_on) else { continue };
-        let before = Facet { cell, opposite };
-        if complex.facet_class(before).is_some() {
-            walls.push([before, regular.mirror(before)]);
-        }
-    }
 }
 
 /// Each gap, and each solid sector from the end of a gap to the start of the next.

@@ -48,6 +48,7 @@ use corners::{Corners, Sectors, Voronoi};
 use rayon::prelude::*;
 
 use super::MedialMesh;
+use super::mesh::run_starts;
 use crate::Vec3;
 use crate::geometry::dual_complex::Class;
 use crate::geometry::triangulation::Facet;
@@ -369,13 +370,7 @@ fn close_up(sides: &[Side], corners: usize, tally: &mut AxisTally) -> Vec<Polygo
 /// The sides in the order of their smaller corners, by a counting sort: a comparison sort of all sides
 /// would take longer than the rest of the axis.
 fn by_first_corner(sides: &[Side], corners: usize) -> Vec<Side> {
-    let mut next = vec![0_u32; corners + 1];
-    for side in sides {
-        next[side.corners[0] as usize + 1] += 1;
-    }
-    for corner in 0..corners {
-        next[corner + 1] += next[corner];
-    }
+    let mut next = run_starts(sides.iter().map(|side| side.corners[0]), corners);
     let mut sorted = vec![Side { corners: [NONE; 2], from: NONE, to: NONE }; sides.len()];
     for side in sides {
         let place = &mut next[side.corners[0] as usize];

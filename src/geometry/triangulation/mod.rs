@@ -175,6 +175,13 @@ pub enum TriangulationError {
     TooLarge { points: usize, limit: usize },
 }
 
+impl TriangulationError {
+    /// Whether the points are admissible, but do not span space.
+    pub fn is_flat(&self) -> bool {
+        matches!(self, Self::TooFewPoints { .. } | Self::Collinear { .. } | Self::Coplanar { .. })
+    }
+}
+
 // Cells as flat records, four vertices and four neighbours, 32 bytes.
 
 /// The vertex at infinity while a triangulation is built; sites count from one.

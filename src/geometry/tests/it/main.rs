@@ -6,7 +6,8 @@ mod hull_distances;
 mod poles;
 mod regular;
 
-use medial_geometry::{DualComplex, Sphere, Vec3};
+use medial_geometry::triangulation::Triangulation;
+use medial_geometry::{DualComplex, Sphere, Vec3, VertexId};
 use rand::RngExt;
 use rand_pcg::Pcg64;
 
@@ -26,6 +27,18 @@ fn shuffle<T>(items: &mut [T], rng: &mut Pcg64) {
     for i in (1..items.len()).rev() {
         items.swap(i, rng.random_range(0..=i));
     }
+}
+
+/// Finite cells as sorted quadruples of keys, which do not depend on the order of the input.
+fn cell_set<K: Ord>(triangulation: &Triangulation, key: impl Fn(VertexId) -> K) -> Vec<[K; 4]> {
+    let cells = triangulation.finite_cells().map(|cell| {
+        let mut keys = triangulation.vertices(cell).map(&key);
+        keys.sort_unstable();
+        keys
+    });
+    let mut cells: Vec<_> = cells.collect();
+    cells.sort_unstable();
+    cells
 }
 
 /// The dual complex of balls, checked.
