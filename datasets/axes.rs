@@ -501,6 +501,7 @@ struct Builder {
 impl Builder {
     /// Linear in the number of vertices: axes have a few thousand.
     fn vertex(&mut self, sphere: Sphere) -> u32 {
+        // By centre alone: at one place there is one radius on a medial axis.
         let known = self.spheres.iter().position(|s| s.centre.distance(sphere.centre) < WELD);
         known.unwrap_or_else(|| {
             self.spheres.push(sphere);

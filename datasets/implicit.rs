@@ -51,6 +51,7 @@ fn surface_net(field: &impl Field, half: Vec3, edge: f64) -> TriMesh {
     let mut cells = Vec::new();
     lattice.crossed(field, [0; 3], lattice.size, &mut cells);
     let mut net = Net::default();
+    // All vertices before any quadrilateral, which needs those of its four cells.
     for &cell in &cells {
         net.add_vertex(field, &lattice, cell);
     }
@@ -74,6 +75,7 @@ struct Lattice {
 impl Lattice {
     fn around(half: Vec3, spacing: f64) -> Self {
         let needed = (2.0 * half.max_element() / spacing).ceil() as u32 + 2;
+        // A power of two, since blocks are halved down to single cells.
         let size = needed.next_power_of_two();
         Self { origin: Vec3::splat(-0.5 * spacing * f64::from(size)), spacing, size }
     }
@@ -152,6 +154,7 @@ impl Net {
             // Cells around the edge, counter-clockwise seen from its upper end.
             let mut quad = [(1, 1), (0, 1), (0, 0), (1, 0)].map(|(du, dv)| {
                 let mut around = cell;
+                // Not below zero: the lattice is a cell wider than the surface on every side.
                 around[u] -= du;
                 around[v] -= dv;
                 self.vertex_of[&around].0

@@ -41,6 +41,7 @@ pub(crate) const COIL: (f64, f64, f64, f64) = (1.0, 0.8, 2.0, 0.35);
 /// Radius of the cavity of the hollow sphere.
 pub(crate) const CAVITY: f64 = 0.5;
 /// The wedge: half its base, half its length, its height; the edge on top has 40 degrees.
+// The first is 1.2 tan 20 degrees: a constant cannot call the tangent.
 pub(crate) const WEDGE: Vec3 = Vec3::new(0.436_764_281_119_441_5, 0.8, 1.2);
 /// The bracket as a profile with a reflex corner, and with a fillet in its place.
 pub(crate) const BRACKET_ELBOW: Elbow = Elbow {
@@ -188,6 +189,7 @@ pub(crate) fn coil_length() -> f64 {
 /// The point of the coil's centre line at an arc length from its middle.
 pub(crate) fn coil_centre(along: f64) -> Vec3 {
     let (radius, pitch, _, _) = COIL;
+    // One turn has the length of the hypotenuse of its circle and its pitch, unrolled.
     let turn = along / (TAU * radius).hypot(pitch);
     let (sin, cos) = (TAU * turn).sin_cos();
     Vec3::new(radius * cos, radius * sin, pitch * turn)
@@ -240,6 +242,7 @@ pub(crate) fn torus(edge: f64) -> TriMesh {
 }
 
 pub(crate) fn hollow_sphere(edge: f64) -> TriMesh {
+    // Turned over, because faces look away from the solid, here into the cavity.
     let cavity = mapped(unit_sphere(frequency(CAVITY, edge)), |p| p * CAVITY);
     joined(sphere(edge), reversed(cavity))
 }
@@ -280,6 +283,7 @@ pub(crate) fn holed_plate(edge: f64) -> TriMesh {
 
 pub(crate) fn frustum(edge: f64) -> TriMesh {
     let Frustum { below, above, half } = FRUSTUM;
+    // From the top pole down, as `surface` orients its faces.
     let corners = [(0.0, half), (above, half), (below, -half), (0.0, -half)];
     surface(&rings(&Piece::between(&corners), edge))
 }
@@ -312,6 +316,7 @@ pub(crate) fn chain(edge: f64) -> TriMesh {
 }
 
 pub(crate) fn double_torus(edge: f64) -> TriMesh {
+    // Genus 2 has the Euler number 2 - 2 * 2.
     polygonise(&double_torus_field(), Vec3::new(1.8, 1.0, 0.3), edge, -2)
 }
 
@@ -322,6 +327,7 @@ pub(crate) fn double_torus_field() -> Blend {
 }
 
 pub(crate) fn frame(edge: f64) -> TriMesh {
+    // Six edges on four corners leave three independent loops: 2 - 2 * 3.
     polygonise(&frame_field(), Vec3::splat(1.0), edge, -4)
 }
 

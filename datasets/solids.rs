@@ -37,6 +37,7 @@ pub(crate) fn boundary(
                 for (axis, step) in [(0, -1), (0, 1), (1, -1), (1, 1), (2, -1), (2, 1)] {
                     let mut beyond = [i, j, k];
                     beyond[axis] += step;
+                    // Blocks outside the grid count as empty, so its own sides are boundary, too.
                     if !is_filled(ticks, &solid, beyond) {
                         builder.side([i, j, k].map(|n| n as usize), axis, step > 0);
                     }
@@ -83,6 +84,7 @@ impl<P: Fn(Vec3) -> Vec3> Builder<'_, P> {
 
     fn vertex(&mut self, node: [usize; 3]) -> u32 {
         let Self { ticks, place, mesh, ids } = self;
+        // By node and not by place: blocks share vertices exactly, whatever `place` rounds.
         *ids.entry(node).or_insert_with(|| {
             let at = [0, 1, 2].map(|axis| ticks[axis][node[axis]]);
             mesh.vertices.push(place(Vec3::from(at)));
@@ -134,6 +136,7 @@ pub(crate) fn unit_sphere(frequency: u32) -> TriMesh {
             for j in 0..frequency - i {
                 let up = [vertex(i, j), vertex(i + 1, j), vertex(i, j + 1)];
                 mesh.faces.push(up);
+                // The inverted triangle beside it, which the last row does not have.
                 if i + j + 2 <= frequency {
                     mesh.faces.push([up[1], vertex(i + 1, j + 1), up[2]]);
                 }
@@ -382,6 +385,7 @@ impl Curve {
         let lengths = self.lengths();
         let half = lengths[lengths.len() - 1] / 2.0;
         mapped(capsule_of(half, radius, edge), |p| {
+            // Beyond its ends the curve goes on straight: the hemispheres stay round.
             let along = p.z.clamp(-half, half);
             let at = self.at_length(&lengths, along + half);
             let tangent = (self.derivative)(at).normalize();

@@ -3,9 +3,11 @@
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, Sphere, betti};
 use medial::geometry::PowerCrust;
-use medial::metrics::{DistanceOptions, spikes, surface_distances, triangle_quality};
+use medial::metrics::{spikes, triangle_quality};
 use medial::shape::{Shape, ShapeOptions};
-use medial::surface::{self, Normalisation, Sampling, SurfaceReport, TriMesh, validate};
+use medial::surface::{
+    self, Normalisation, Sampling, SurfaceReport, TriMesh, TriangleBvh, sample, validate,
+};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -461,14 +463,16 @@ fn crust(built_in: &BuiltIn, count: usize) -> Crust {
         COINCIDENT,
     )
     .mesh;
-    let tree = shape.surface_tree().expect("faces");
-    let options =
-        DistanceOptions { surface_samples: 5_000, envelope_samples: 5_000, ..Default::default() };
-    let apart = surface_distances(shape.mesh(), &tree, &made, &options).expect("both have area");
+    let farthest = |from: &TriMesh, to: &TriMesh| {
+        let mut points = sample(from, &Sampling::AreaUniform { count: 5_000, seed: 0 });
+        points.extend(&from.vertices);
+        let distances = TriangleBvh::new(to).expect("faces").distance_batch(&points);
+        distances.into_iter().fold(0.0, f64::max)
+    };
     let area = shape.report().area.expect("finite") / shape.normalisation().diagonal.powi(2);
     Crust {
         report: surface::validate(&made).expect("a closed manifold"),
-        distances: [apart.forward, apart.reverse],
+        distances: [farthest(shape.mesh(), &made), farthest(&made, shape.mesh())],
         spacing: (area / count as f64).sqrt(),
         crossing: deepest_crossing(&made),
     }

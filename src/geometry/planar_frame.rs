@@ -84,12 +84,6 @@ impl PlanarFrame {
         self.apex[1] == 0.0
     }
 
-    /// Reciprocal squared lengths of the sides `ac` and `bc`, 0 for a side of no length.
-    #[inline]
-    pub fn reciprocal(&self) -> [f64; 2] {
-        self.reciprocal
-    }
-
     /// In-plane coordinates of `p`, and its height over the plane.
     #[inline]
     pub fn local(&self, p: Vec3) -> [f64; 3] {

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::axis_distance::{PreparedAxis, prepared_axis_distance};
-use super::hausdorff::{distances_with_envelope, surface_distances_from};
+use super::hausdorff::distances_with_envelope;
 use super::samples::{Pose, SurfaceSamples};
 use super::spikes::{centres_outside, protrusion};
 use super::volume::{Sides, box_in, volume_error_in};
 use super::{
-    AxisOptions, Certificate, DistanceOptions, MetricError, SurfaceDistances, VolumeOptions,
-    certify, spikes, topology_warning,
+    AxisOptions, Certificate, DistanceOptions, MetricError, VolumeOptions, certify, spikes,
+    topology_warning,
 };
 use crate::Vec3;
 use crate::complex::{Incidence, MedialMesh, MedialUnion, ZERO_LENGTH, betti, euler};
@@ -85,11 +85,6 @@ impl Judge {
     /// How results are measured.
     pub fn options(&self) -> JudgeOptions {
         self.options
-    }
-
-    /// The known facts about the true axis.
-    pub fn truth(&self) -> &Truth {
-        &self.truth
     }
 
     /// Every metric of a medial mesh in normalised units: the same values for every numbering of its
@@ -171,15 +166,6 @@ impl Judge {
             envelope_samples: self.options.samples,
             seed: self.options.seed,
         }
-    }
-
-    /// Distances of another surface in normalised units, such as one that was decimated, by the same
-    /// samples as those of a medial mesh.
-    ///
-    /// # Errors
-    /// When it has no area.
-    pub fn surface_distances(&self, other: &TriMesh) -> Result<SurfaceDistances, MetricError> {
-        surface_distances_from(self.samples()?, &self.tree, other, &self.distance_options())
     }
 
     /// An interval no wider than `tolerance` that holds the Hausdorff distance of

@@ -18,7 +18,7 @@ pub use ascent::{Peak, PeakSearch, Peaks};
 pub use axis_distance::{AxisOptions, COVERED, axis_distance};
 pub use certificate::{Certificate, FINEST, ROUNDING, Witness, WitnessSide, certify};
 pub use envelope::{EnvelopeOptions, sample_envelope};
-pub use hausdorff::{DistanceOptions, MetricError, SurfaceDistances, distances, surface_distances};
+pub use hausdorff::{DistanceOptions, MetricError, distances};
 pub use judge::{
     AxisDistances, AxisSpan, Counts, Distances, Evaluation, Judge, JudgeOptions, RatioSpikes,
     SheetCoverage, Spikes, TriangleQuality, Truth, counts, triangle_quality,

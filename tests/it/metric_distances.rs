@@ -8,15 +8,12 @@ use medial::complex::{MedialMesh, MedialUnion, UnionError};
 use medial::geometry::{Cone, Slab, Sphere};
 use medial::metrics::{
     AxisOptions, Certificate, DistanceOptions, Distances, EnvelopeOptions, Judge, JudgeOptions,
-    MetricError, ROUNDING, SurfaceDistances, Truth, VolumeOptions, Witness, WitnessSide,
-    axis_distance, certify, distances, enclosed_volume, sample_envelope, surface_distances,
-    volume_error,
+    MetricError, ROUNDING, Truth, VolumeOptions, Witness, WitnessSide, axis_distance, certify,
+    distances, enclosed_volume, sample_envelope, volume_error,
 };
 use medial::surface::{InsideTest, TriMesh, TriangleBvh};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-
-use crate::nearest::to_triangle;
 
 const OPTIONS: DistanceOptions =
     DistanceOptions { surface_samples: 20_000, envelope_samples: 20_000, seed: 0 };
@@ -343,85 +340,9 @@ fn a_union_whose_area_all_but_underflows_is_its_centres() {
     }
 }
 
-// Distances between surfaces against closed forms and brute force.
-
 /// The box of the given half sides around the origin.
 fn centred_cuboid(half: Vec3) -> TriMesh {
     crate::shapes::cuboid(-half, half)
-}
-
-fn measure_surfaces(surface: &TriMesh, other: &TriMesh) -> SurfaceDistances {
-    surface_distances(surface, &TriangleBvh::new(surface).unwrap(), other, &OPTIONS).unwrap()
-}
-
-#[test]
-fn boxes_in_boxes() {
-    let (inner, outer) =
-        (centred_cuboid(Vec3::new(0.4, 0.3, 0.2)), centred_cuboid(Vec3::new(0.5, 0.4, 0.3)));
-    let same = measure_surfaces(&inner, &inner);
-    assert!(same.hausdorff < 1e-15, "{same:?}");
-    // From the inner box the outer one is 0.1 away everywhere; its corners are farther.
-    let out = measure_surfaces(&inner, &outer);
-    assert!((out.forward - 0.1).abs() < 1e-15 && (out.mean - 0.1).abs() < 1e-12, "{out:?}");
-    assert!((out.rms - 0.1).abs() < 1e-12, "{out:?}");
-    assert!((out.reverse - 0.1 * 3f64.sqrt()).abs() < 1e-15, "{out:?}");
-    assert_eq!(out.hausdorff, out.reverse);
-    assert_eq!((out.samples, out.reverse_samples), (20_008, 20_008));
-    // And the other way round.
-    let back = measure_surfaces(&outer, &inner);
-    assert_eq!((back.forward, back.reverse), (out.reverse, out.forward));
-    assert!((back.mean - out.reverse_mean).abs() < 1e-4, "{back:?} {out:?}");
-}
-
-#[test]
-fn random_soups_agree_with_brute_force() {
-    let mut rng = Pcg64::seed_from_u64(11);
-    let mut soup = |count: u32| {
-        let mut point = || Vec3::new(rng.random(), rng.random(), rng.random());
-        let vertices = (0..3 * count).map(|_| point()).collect();
-        let faces = (0..count).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
-        TriMesh { vertices, faces }
-    };
-    let (s, t) = (soup(6), soup(9));
-    let options = DistanceOptions { surface_samples: 1, envelope_samples: 1, seed: 5 };
-    let found = surface_distances(&s, &TriangleBvh::new(&s).unwrap(), &t, &options).unwrap();
-    // Vertices are among the samples: their largest distance is a lower bound, and one uniform
-    // sample beside them moves it by at most its own distance, which the brute force bounds too.
-    let directed = |from: &TriMesh, to: &TriMesh| {
-        let nearest = |&p: &Vec3| {
-            (0..to.faces.len()).map(|f| to_triangle(p, to.triangle(f))).fold(f64::MAX, f64::min)
-        };
-        from.vertices.iter().map(nearest).fold(0.0, f64::max)
-    };
-    let (there, back) = (directed(&s, &t), directed(&t, &s));
-    // The distance to one triangle is convex, so a vertex is often, not always, the farthest.
-    assert!(found.forward >= there - 1e-7 && found.reverse >= back - 1e-7, "{found:?}");
-    let other = if found.mean > there + 1e-7 { found.mean } else { there };
-    assert!((found.forward - other).abs() < 1e-6, "{found:?} {there}");
-    assert_eq!((found.samples, found.reverse_samples), (19, 28));
-}
-
-#[test]
-fn a_judge_measures_the_same_from_the_samples_that_it_keeps() {
-    let (inner, outer) =
-        (centred_cuboid(Vec3::new(0.4, 0.3, 0.2)), centred_cuboid(Vec3::new(0.41, 0.29, 0.25)));
-    let tree = Arc::new(TriangleBvh::new(&inner).unwrap());
-    let inside = Arc::new(InsideTest::new(&inner));
-    let options = JudgeOptions { samples: 3_000, volume_depth: 0, seed: 8 };
-    let judge = Judge::new(inner.clone(), Arc::clone(&tree), inside, Truth::default(), options);
-    let afresh = DistanceOptions { surface_samples: 3_000, envelope_samples: 3_000, seed: 8 };
-    let afresh = surface_distances(&inner, &tree, &outer, &afresh).unwrap();
-    assert_eq!(judge.surface_distances(&outer).unwrap(), afresh);
-}
-
-#[test]
-fn surfaces_without_area_are_refused() {
-    let solid = centred_cuboid(Vec3::ONE);
-    let tree = TriangleBvh::new(&solid).unwrap();
-    let flat = TriMesh { vertices: vec![Vec3::ZERO; 3], faces: vec![[0, 1, 2]] };
-    assert!(surface_distances(&solid, &tree, &flat, &DistanceOptions::default()).is_err());
-    let none = DistanceOptions { envelope_samples: 0, ..Default::default() };
-    assert!(surface_distances(&solid, &tree, &solid, &none).is_err());
 }
 
 // Certified intervals.

@@ -19,7 +19,7 @@ fn on_segment(p: Vec3, a: Vec3, b: Vec3) -> f64 {
 }
 
 /// Distance to a triangle, thin ones included: its plane where the foot is inside, else its sides.
-pub(crate) fn to_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> f64 {
+fn to_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> f64 {
     let sides = on_segment(p, a, b).min(on_segment(p, b, c)).min(on_segment(p, c, a));
     let n = (b - a).cross(c - a);
     let inside = [(a, b), (b, c), (c, a)].iter().all(|&(u, v)| n.dot((v - u).cross(p - u)) > 0.0);

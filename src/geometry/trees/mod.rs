@@ -148,20 +148,6 @@ impl Tree {
         &self.order
     }
 
-    /// For each node the places of the items below it.
-    pub fn ranges(&self) -> Vec<Range<usize>> {
-        let mut ranges = vec![0..0; self.nodes.len()];
-        // Children follow their parents, so backwards they are known; the left has smaller places.
-        for (index, node) in self.nodes.iter().enumerate().rev() {
-            let first = node.first as usize;
-            ranges[index] = match node.count {
-                0 => ranges[first].start..ranges[first + 1].end,
-                count => first..first + count as usize,
-            };
-        }
-        ranges
-    }
-
     /// The places of the items below a node.
     pub fn places(&self, node: usize) -> Range<u32> {
         let (mut first, mut last) = (&self.nodes[node], &self.nodes[node]);
