@@ -20,7 +20,7 @@
 
 use rayon::prelude::*;
 
-use super::envelope::{EnvelopeOptions, sample_envelope_along};
+use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::hausdorff::{BURIAL, EXPOSED};
 use super::samples::{Pose, SurfaceSamples};
 use super::{DistanceOptions, MetricError};
@@ -277,7 +277,7 @@ impl<'a> PeakSearch<'a> {
             burial: BURIAL * pose.diameter(),
             seed: options.seed,
         };
-        let points = sample_envelope_along(pose.axes(), &mesh, &union, &envelope)?;
+        let points = sample_envelope_in(pose, &mesh, &union, &envelope)?.points;
         let values = tree.distance_batch(&points);
         let hill = OnUnion { union: &union, surface: tree, burial: EXPOSED * pose.diameter() };
         let start = samples.start(&sigma);

@@ -13,6 +13,17 @@
 //! Spheres are sampled along an equal-area spiral, cones and triangles by low-discrepancy sequences.
 //! Each patch is turned or shifted at random, so that even a single sample is uniformly distributed
 //! over its patch.
+//!
+//! # Rounding
+//! On flat parts many primitives touch, and rounding decides which of them is a hair deeper. Three
+//! rules keep such a decision from moving any other sample:
+//!
+//! - A sample's weight falls linearly from 1 to 0 between half the burial depth and the burial depth.
+//!   The pilot's share is a sum of weights, so the density changes by as little as the depths do.
+//! - The order and the random turn of a patch depend on its spheres, rounded far more coarsely than any
+//!   error of theirs, and not on its place in a list from which another patch may vanish.
+//! - Patches get their number of samples from a running sum of areas. A patch that rounding adds or
+//!   removes has no area to speak of.
 
 use std::f64::consts::{PI, TAU};
 
@@ -21,6 +32,7 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 use super::MetricError;
+use super::samples::Pose;
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion};
 use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
@@ -30,7 +42,7 @@ use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
 pub struct EnvelopeOptions {
     /// Approximate number of samples.
     pub samples: usize,
-    /// A point deeper than this inside some primitive is not on the boundary. In the unit of the
+    /// A point as deep as this inside some primitive is not on the boundary. In the unit of the
     /// medial mesh.
     pub burial: f64,
     /// Seed of the turns and shifts.
@@ -68,40 +80,61 @@ pub fn sample_envelope(
     union: &MedialUnion,
     options: &EnvelopeOptions,
 ) -> Result<Vec<Vec3>, MetricError> {
-    sample_envelope_along(Vec3::AXES, mesh, union, options)
+    Ok(sample_envelope_in(&Pose::coordinates(), mesh, union, options)?.points)
 }
 
-/// As [`sample_envelope`], laid out along orthonormal, right-handed `axes` instead of those of the
-/// coordinates.
-pub(super) fn sample_envelope_along(
-    axes: [Vec3; 3],
+/// Samples of the boundary of a union.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Weighted {
+    pub points: Vec<Vec3>,
+    /// From above 0 to 1, smaller for points that are nearly buried.
+    pub weights: Vec<f64>,
+}
+
+/// As [`sample_envelope`], laid out in the frame `pose` instead of that of the coordinates.
+pub(super) fn sample_envelope_in(
+    pose: &Pose,
     mesh: &MedialMesh,
     union: &MedialUnion,
     options: &EnvelopeOptions,
-) -> Result<Vec<Vec3>, MetricError> {
+) -> Result<Weighted, MetricError> {
     if options.samples == 0 {
         return Err(MetricError::NoSamples("envelope_samples"));
     }
-    let patches = patches(mesh);
-    let total = patches.iter().map(Patch::area).sum::<f64>();
+    let patches = patches(mesh, pose);
+    let total = patches.iter().map(|patch| patch.surface.area()).sum::<f64>();
     let asked = options.samples as f64;
     // Candidates per area of the densest run: if this overflows, the union has no area to speak of.
     let densest = (asked * MAX_CANDIDATES).max(MIN_PILOT) / total;
     if !(total > 0.0 && total.is_finite() && densest.is_finite()) {
-        return Ok(mesh.spheres.iter().map(|m| m.centre).collect());
+        let points: Vec<Vec3> = mesh.spheres.iter().map(|m| m.centre).collect();
+        return Ok(Weighted { weights: vec![1.0; points.len()], points });
     }
-    let sampled = |candidates| sample_patches(&patches, axes, candidates / total, union, options);
+    let sampled =
+        |candidates| sample_patches(&patches, pose.axes(), candidates / total, union, options);
     let pilot = (asked / PILOT).max(MIN_PILOT);
-    let share = sampled(pilot).len() as f64 / pilot;
-    let mut points = sampled(asked * candidates_for(share));
-    let survivors = points.len() as f64 / (asked * candidates_for(share));
-    if (points.len() as f64) < MIN_SHARE * asked
-        && candidates_for(survivors) > candidates_for(share)
-    {
+    let share = sampled(pilot).total() / pilot;
+    let mut samples = sampled(asked * candidates_for(share));
+    let survivors = samples.total() / (asked * candidates_for(share));
+    if samples.total() < MIN_SHARE * asked && candidates_for(survivors) > candidates_for(share) {
         // The pilot run had too few survivors to estimate their share.
-        points = sampled(asked * candidates_for(survivors));
+        samples = sampled(asked * candidates_for(survivors));
     }
-    Ok(points)
+    Ok(samples)
+}
+
+impl Weighted {
+    /// The sum of the weights.
+    fn total(&self) -> f64 {
+        self.weights.iter().sum()
+    }
+
+    /// The mean of a value at each point.
+    pub fn mean(&self, values: &[f64]) -> f64 {
+        let weighted = self.weights.iter().zip(values).map(|(weight, value)| weight * value);
+        // Without points, as without area, there is nothing to be far from.
+        weighted.sum::<f64>() / self.total().max(f64::MIN_POSITIVE)
+    }
 }
 
 /// Candidates per requested sample, if this share of them survives.
@@ -111,29 +144,71 @@ fn candidates_for(share: f64) -> f64 {
 }
 
 /// A piece of the boundary of one primitive.
-enum Patch {
+enum Surface {
     Sphere(Sphere),
     /// Start sphere, end sphere, frame.
     Lateral(Sphere, Sphere, ConeFrame),
     Triangle([Vec3; 3]),
 }
 
-fn patches(mesh: &MedialMesh) -> Vec<Patch> {
-    let mut patches: Vec<Patch> = mesh.spheres.iter().map(|&m| Patch::Sphere(m)).collect();
-    for ends in &mesh.edges {
-        let [a, b] = mesh.spheres_of(*ends);
+/// A piece to be sampled, and where it is.
+struct Patch {
+    surface: Surface,
+    /// Spheres, laterals, and the two sides of slabs.
+    kind: u64,
+    /// The cells of its spheres, in ascending order; zero where it has fewer.
+    cells: [[u64; 2]; 3],
+}
+
+/// The patches of a mesh, in an order that neither the numbering nor rounding changes.
+fn patches(mesh: &MedialMesh, pose: &Pose) -> Vec<Patch> {
+    let cells: Vec<_> = mesh.spheres.iter().map(|m| pose.cell(m.centre, m.radius)).collect();
+    let of = |corners: &[u32]| {
+        std::array::from_fn(|k| corners.get(k).map_or([0; 2], |&v| cells[v as usize]))
+    };
+    let mut patches: Vec<Patch> = (0..)
+        .zip(&mesh.spheres)
+        .map(|(v, &m)| Patch { surface: Surface::Sphere(m), kind: 0, cells: of(&[v]) })
+        .collect();
+    for &(mut ends) in &mesh.edges {
+        ends.sort_by_key(|&v| cells[v as usize]);
+        let [a, b] = mesh.spheres_of(ends);
         if let Some(frame) = Cone::new(a, b).frame() {
-            patches.push(Patch::Lateral(a, b, frame));
+            patches.push(Patch {
+                surface: Surface::Lateral(a, b, frame),
+                kind: 1,
+                cells: of(&ends),
+            });
         }
     }
-    for corners in &mesh.faces {
-        let corners = mesh.spheres_of(*corners);
-        if let Some(planes) = Slab::new(corners).planes() {
-            let touching = planes.normals().map(|n| corners.map(|m| m.centre + m.radius * n));
-            patches.extend(touching.map(Patch::Triangle));
+    for &(mut corners) in &mesh.faces {
+        corners.sort_by_key(|&v| cells[v as usize]);
+        let balls = mesh.spheres_of(corners);
+        if let Some(planes) = Slab::new(balls).planes() {
+            for (normal, kind) in planes.normals().into_iter().zip(2..) {
+                let surface = Surface::Triangle(balls.map(|m| m.centre + m.radius * normal));
+                patches.push(Patch { surface, kind, cells: of(&corners) });
+            }
         }
     }
+    // Stable: patches of the same cells are equal but for rounding.
+    patches.sort_by_key(|patch| (patch.kind, patch.cells));
     patches
+}
+
+impl Patch {
+    /// The seed of the random numbers that turn it.
+    fn stream(&self) -> u64 {
+        self.cells.as_flattened().iter().fold(self.kind, |hash, &cell| mix(hash ^ cell))
+    }
+}
+
+/// The finaliser of SplitMix64: every bit of the input moves half of the bits of the result.
+fn mix(mut bits: u64) -> u64 {
+    bits = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    bits ^ (bits >> 31)
 }
 
 /// The candidates of all patches at one density (points per area) that are not buried.
@@ -143,36 +218,39 @@ fn sample_patches(
     density: f64,
     union: &MedialUnion,
     options: &EnvelopeOptions,
-) -> Vec<Vec3> {
+) -> Weighted {
     // Rounding the running sum, not each patch, keeps the density right for small patches.
     let mut expected = Pcg64::seed_from_u64(options.seed).random::<f64>();
     let counts: Vec<usize> = patches
         .iter()
         .map(|patch| {
             let before = expected.floor();
-            expected += patch.area() * density;
+            expected += patch.surface.area() * density;
             (expected.floor() - before) as usize
         })
         .collect();
-    patches
-        .par_iter()
-        .zip(&counts)
-        .enumerate()
-        .flat_map_iter(|(index, (patch, &count))| {
-            // A stream per patch: points do not depend on which thread samples which patch.
-            let stream = (index as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            let mut points = Vec::new();
-            if count > 0 {
-                let mut rng = Pcg64::seed_from_u64(options.seed ^ stream);
-                patch.sample(axes, count, &mut rng, &mut points);
-                union.retain_unburied(&mut points, options.burial);
-            }
-            points
+    let samples = patches.par_iter().zip(&counts).flat_map_iter(|(patch, &count)| {
+        let mut points = Vec::new();
+        if count > 0 {
+            let mut rng = Pcg64::seed_from_u64(options.seed ^ patch.stream());
+            patch.surface.sample(axes, count, &mut rng, &mut points);
+            // Most buried points are found by the first primitive that is tried.
+            union.retain_unburied(&mut points, options.burial);
+        }
+        let mut near = 0;
+        points.into_iter().filter_map(move |point| {
+            let depth = -union.signed_from(point, &mut near);
+            let weight = (2.0 * (1.0 - depth / options.burial)).min(1.0);
+            // Without a burial depth only points in no primitive at all are on the boundary.
+            let weight = if options.burial > 0.0 { weight } else { 1.0 };
+            (weight > 0.0).then_some((point, weight))
         })
-        .collect()
+    });
+    let (points, weights) = samples.unzip();
+    Weighted { points, weights }
 }
 
-impl Patch {
+impl Surface {
     fn area(&self) -> f64 {
         match self {
             Self::Sphere(m) => 4.0 * PI * m.radius * m.radius,

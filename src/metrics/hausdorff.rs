@@ -19,13 +19,13 @@
 //! - Where S runs inside U, `|sigma|` is a lower bound of the distance to the boundary of U:
 //!   `epsilon_union` is the distance between the surfaces only where S runs outside U. The reverse
 //!   distance, which is exact, covers the other case.
-//! - A point that another primitive covers by less than the burial depth counts as on U's boundary.
-//!   So strips along the curves where neighbouring primitives touch count more than once in
-//!   `reverse_mean`.
+//! - A point that another primitive covers by less than the burial depth counts as on U's boundary,
+//!   with a weight that falls to 0 at this depth. So strips along the curves where neighbouring
+//!   primitives touch count more than once in `reverse_mean`.
 
 use super::Distances;
 use super::ascent::{OnMesh, OnUnion, Peak, Start, ascend};
-use super::envelope::{EnvelopeOptions, sample_envelope_along};
+use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::samples::{SEEDS, SurfaceSamples};
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, UnionError};
@@ -155,11 +155,11 @@ pub(super) fn distances_with_envelope(
         burial: BURIAL * pose.diameter(),
         seed: options.seed,
     };
-    let envelope = sample_envelope_along(pose.axes(), mesh, union, &envelope)?;
-    let mut envelope = Envelope { distances: bvh.distance_batch(&envelope), points: envelope };
-    // Before the ascent adds points, which are not uniform.
-    let reverse_mean = Summary::new(&envelope.distances).mean;
-    let reverse_samples = envelope.points.len();
+    let sampled = sample_envelope_in(pose, mesh, union, &envelope)?;
+    let on_boundary = bvh.distance_batch(&sampled.points);
+    let reverse_mean = sampled.mean(&on_boundary);
+    let reverse_samples = sampled.points.len();
+    let mut envelope = Envelope { points: sampled.points, distances: on_boundary };
     let hill = OnUnion { union, surface: bvh, burial: EXPOSED * pose.diameter() };
     let (points, values) = (envelope.points.as_slice(), envelope.distances.as_slice());
     let peaks = ascend(&hill, &Start { points, values, ..start });

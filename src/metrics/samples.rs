@@ -283,6 +283,17 @@ impl Pose {
         self.place(p, 0.0)
     }
 
+    /// The cell of a sphere: a millionth of the size along the curve, and as much in the radius.
+    ///
+    /// A motion that rounds otherwise moves a sphere into another cell as rarely as rounding is small
+    /// compared to a cell.
+    pub fn cell(&self, p: Vec3, radius: f64) -> [u64; 2] {
+        let scaled = |v: Vec3| v / (3.0 * self.size) + OFFSET;
+        let cells = (1_u64 << 21) as f64;
+        let radius = scaled(Vec3::splat(radius)).x * cells;
+        [morton_code(scaled(self.local(p)) * cells), radius as u64]
+    }
+
     /// The place of a point on the curve; within a cell finer coordinates decide, then the radius.
     fn place(&self, p: Vec3, radius: f64) -> Place {
         // From 0.17 to 0.83: the surface is inside the curve's cube, with room around it.

@@ -10,6 +10,7 @@ mod filters;
 mod hem;
 mod pmat;
 mod qmat;
+mod rounding;
 mod sat;
 mod tam_heidrich;
 mod vmas;
