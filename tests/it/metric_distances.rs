@@ -1,17 +1,16 @@
 //! Distances, certified intervals, volume error and axis distance against closed forms.
 
 use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, UnionError};
 use medial::geometry::{Cone, Slab, Sphere};
 use medial::metrics::{
-    AxisOptions, Certificate, DistanceOptions, Distances, EnvelopeOptions, Judge, JudgeOptions,
-    MetricError, ROUNDING, Truth, VolumeOptions, Witness, WitnessSide, axis_distance, certify,
-    distances, enclosed_volume, sample_envelope, volume_error,
+    AxisOptions, Certificate, DistanceOptions, Distances, EnvelopeOptions, MetricError, ROUNDING,
+    VolumeOptions, Witness, WitnessSide, axis_distance, certify, distances, enclosed_volume,
+    sample_envelope, volume_error,
 };
-use medial::surface::{InsideTest, TriMesh, TriangleBvh};
+use medial::surface::{TriMesh, TriangleBvh};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
