@@ -6,7 +6,7 @@
 # Tests are files in tests/, benches/, examples/ and fuzz/, files named *tests.rs, and `#[cfg(test)]` modules.
 # The number of files that one comparison passes needs a build:
 #   RUSTFLAGS=-Cinstrument-coverage cargo build; LLVM_PROFILE_FILE=x.%p target/debug/medial compare bear.off
-#   llvm-profdata merge x.* -o x; llvm-cov report target/debug/medial -instr-profile x | awk '$5 != "0.00%"'
+#   profparser show --all-functions --input x.1234     (cargo install llvm_profparser; functions, named by module)
 cd "${1:-$(dirname "$0")/..}" || exit 2
 exec python3 - <<'END'
 import json, re, subprocess
