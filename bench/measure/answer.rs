@@ -314,8 +314,14 @@ impl Bounds<'_> {
                 return bounds.iter().try_for_each(|&b| each(failed(b, fault.clone()), None));
             }
         };
-        let mut search =
-            Search::new(simplification.as_mut(), self.sweep, most, self.measure, self.trying);
+        let mut search = Search::new(
+            simplification.as_mut(),
+            self.info.incremental,
+            self.sweep,
+            most,
+            self.measure,
+            self.trying,
+        );
         let mut broken: Option<Fault> = None;
         // The loosest bound first: the levels tried for it help the others.
         for &bound in bounds {

@@ -334,7 +334,9 @@ impl Run {
             let _ = context.step(0, usize::MAX);
         };
         let sweep = self.method.sweep();
-        let mut search = Search::new(prepared.as_mut(), sweep, most, &measure, &trying);
+        let is_incremental = self.method.get().info().incremental;
+        let mut search =
+            Search::new(prepared.as_mut(), is_incremental, sweep, most, &measure, &trying);
         let found = search.within(bound)?;
         let Found { within: Some(Probe { level, error, .. }), tried, .. } = found else {
             return Err(Failure::parameter(found.refusal(bound)));
