@@ -20,6 +20,7 @@ const MOST_THREADS: u64 = 1024;
 
 /// Options of every verb.
 #[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Global options")]
 pub struct Global {
     /// Print one JSON object on standard output, and nothing else there.
     #[arg(long, global = true)]

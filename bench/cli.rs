@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use clap_complete::Shell;
 use medial::simplifier::Registered;
 
@@ -19,7 +19,7 @@ use crate::study::registry::Registry;
 
 /// Simplify the 3D medial axis transform, and compare the published methods that do.
 #[derive(Debug, Parser)]
-#[command(name = "medial", version, propagate_version = true, arg_required_else_help = true)]
+#[command(name = "medial", version, arg_required_else_help = true)]
 pub struct Cli {
     /// What every verb takes.
     #[command(flatten)]
@@ -102,7 +102,8 @@ fn run_with(
 ) -> Exit {
     // First, so that a signal at any later moment removes temporary files.
     interrupt::install();
-    let cli = match Cli::try_parse_from(words) {
+    let matches = command().try_get_matches_from(words);
+    let cli = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         // Help and version are asked for, and belong on standard output.
         Err(error) if !error.use_stderr() => {
@@ -125,6 +126,30 @@ fn run_with(
         failure.code
     });
     exit_after_output(exit)
+}
+
+/// The verbs of each group, in the order of the help.
+const GROUPS: [(&str, &[&str]); 4] = [
+    ("Compare methods", &["compare", "check", "methods"]),
+    ("One mesh", &["simplify", "axis", "evaluate", "render", "reconstruct"]),
+    ("Files", &["info", "repair", "convert", "datasets"]),
+    ("Results of comparisons", &["report", "diff", "history"]),
+];
+
+/// The command line: as derived, with the verbs in groups, which clap does not have.
+pub fn command() -> Command {
+    let command = Cli::command();
+    let mut help = String::from("{about}\n\n{usage-heading} {usage}\n");
+    for (group, verbs) in GROUPS {
+        help.push_str(&format!("\n{group}:\n"));
+        for verb in verbs {
+            let about = command.find_subcommand(verb).and_then(Command::get_about);
+            let about = about.map(ToString::to_string).unwrap_or_default();
+            help.push_str(&format!("  {verb:<13}{about}\n"));
+        }
+    }
+    help.push_str("\nGlobal options:\n{options}\n\n`medial VERB --help` describes the options of a verb.\n");
+    command.help_template(help)
 }
 
 fn registry(
@@ -161,7 +186,7 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::History(arguments) => cmd::history::run(&arguments, global),
         Verb::Completions { shell } => {
             let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "medial", &mut script);
+            clap_complete::generate(shell, &mut command(), "medial", &mut script);
             print_raw(&String::from_utf8_lossy(&script));
             Ok(Exit::Done)
         }

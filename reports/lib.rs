@@ -48,7 +48,7 @@ pub use record::{
     Conditions, Initial, Machine, OwnSeconds, Record, Repetition, Simplify, Stages, Status, Target,
 };
 pub use terminal::summary_text;
-pub use text::{file_stem, printable};
+pub use text::{file_stem, printable, significant};
 pub use view3d::View3d;
 pub use write::{ReportError, read_header, write_report};
 

@@ -2,7 +2,7 @@
 
 /// A number with a fixed count of significant digits, without an exponent where it can be read
 /// without one: `1.52`, `0.0371`, `34702`, `1.2e-9`.
-pub(crate) fn significant(value: f64, digits: usize) -> String {
+pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }

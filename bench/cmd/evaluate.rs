@@ -6,7 +6,7 @@ use clap::Args;
 use medial::complex::LoadedMa;
 use medial::metrics::{Certificate, Evaluation, Judge, MetricError, Witness, WitnessSide};
 use medial::shape::{Fit, Shape, ShapeOptions};
-use medial_reports::measured_rows;
+use medial_reports::{measured_rows, significant};
 use serde::Serialize;
 use serde_json::json;
 
@@ -216,9 +216,7 @@ fn print_evaluation(evaluation: &Evaluation) {
             WitnessSide::Surface => "surface",
             WitnessSide::Union => "union",
         };
-        print_line(&format!(
-            "  {:<32} on the {on}: {} {} {}",
-            "farthest point", point.x, point.y, point.z
-        ));
+        let [x, y, z] = point.to_array().map(|x| significant(x, 4));
+        print_line(&format!("  {:<32} on the {on}: {x} {y} {z}", "farthest point"));
     }
 }

@@ -12,7 +12,7 @@ use medial::{complex, surface};
 use medial_methods::aof::LatticeVoxels;
 use medial_methods::tam_heidrich::{OuterPoles, PartInfo, RemainingPoles};
 use medial_methods::{aof, tam_heidrich};
-use medial_reports::{Simplify, Status};
+use medial_reports::{Simplify, Status, file_stem};
 use serde::Serialize;
 use serde_json::json;
 
@@ -24,7 +24,7 @@ use crate::files::{COINCIDENT, SURFACES, check_extension, check_folder, check_ou
 use crate::measure::answer::{Bounds, Fault, LevelRun, answer, preparing};
 use crate::measure::search::Found;
 use crate::measure::{fill_costs, fill_result};
-use crate::output::{counted, note, print_json, print_line, version};
+use crate::output::{counted, print_json, print_line, version};
 use crate::progress::StageLine;
 use crate::study::external::{AxisOptions, percent, read_axis};
 use crate::study::registry::{Entry, Registry};
@@ -78,6 +78,12 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let line = StageLine::new(global.stages());
     line.at("reading");
     let (input, mut shape) = shape_of(&arguments.mesh, options)?;
+    if arguments.outputs.is_empty() && !global.json {
+        let example = format!("{}-{}.ma", file_stem(&input.name), arguments.method);
+        return Err(Failure::usage(format!(
+            "the result would be lost: write it with -o {example}, or print its figures with --json"
+        )));
+    }
     let mut warnings = input.report.warnings.clone();
     if let Some(path) = &arguments.initial {
         let (initial, notes) = read_axis(path, &shape, arguments.fitting)?.0.with_remarks();
@@ -116,7 +122,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         }
         print_json(&object, &warnings);
     } else {
-        print_result(&simplify, search.as_ref(), arguments, global);
+        print_result(&simplify, search.as_ref(), arguments);
         if let Some(parts) = simplified.extras.get::<Vec<PartInfo>>() {
             print_line(&format!("  {}, listed by --json", counted(parts.len() as u64, "part")));
         }
@@ -218,12 +224,7 @@ impl Arguments {
     }
 }
 
-fn print_result(
-    simplify: &Simplify,
-    search: Option<&Searched>,
-    arguments: &Arguments,
-    global: &Global,
-) {
+fn print_result(simplify: &Simplify, search: Option<&Searched>, arguments: &Arguments) {
     let seconds = simplify.seconds.unwrap_or_default();
     print_line(&format!(
         "{}: {}, {}, {}; substrates {:.2} s, prepare {:.2} s, simplify {:.2} s",
@@ -246,11 +247,7 @@ fn print_result(
             counted(search.tried as u64, "level")
         ));
     }
-    let written = arguments.outputs.written();
-    written.iter().for_each(|line| print_line(&format!("  {line}")));
-    if written.is_empty() {
-        note(global, "medial: the result was not written; -o FILE.ma keeps it");
-    }
+    arguments.outputs.written().iter().for_each(|line| print_line(&format!("  {line}")));
 }
 
 /// What a search over sphere counts found, for the answer to `--max-error`.
@@ -332,6 +329,10 @@ impl Outputs {
             check_folder(path)?;
         }
         Ok(())
+    }
+
+    fn is_empty(&self) -> bool {
+        self.output.is_none() && self.voxels.is_none() && self.power_crust.is_none()
     }
 
     /// Writes the requested files.

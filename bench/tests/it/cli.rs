@@ -103,8 +103,19 @@ fn wrong_words_end_in_usage() {
         &["compare", "builtin:nothing", "--methods", "nothing"],
         &["compare", "--spheres", "0"],
         &["compare", "--set", "qmat.k"],
-        &["simplify", "builtin:box", "--method", "qmat", "--spheres", "5", "--set", "no=1"],
-        &["simplify", "builtin:box", "--method", "angle", "--level", "999"],
+        &[
+            "simplify",
+            "builtin:box",
+            "--method",
+            "qmat",
+            "--spheres",
+            "5",
+            "--set",
+            "no=1",
+            "-o",
+            "x.ma",
+        ],
+        &["simplify", "builtin:box", "--method", "angle", "--level", "999", "-o", "x.ma"],
         &["axis", "builtin:box", "--sampling", "red:5"],
         &["axis", "builtin:box:x"],
         &["info", "builtin:box", "--threads", "0"],
@@ -115,8 +126,11 @@ fn wrong_words_end_in_usage() {
 
 #[test]
 fn printed_results() {
+    let at = folder();
+    let axis = at("qmat.ma");
     let simplify = ["simplify", "builtin:capsule", "--method", "qmat", "--spheres", "20"];
-    insta::assert_snapshot!("simplify", without_timings(&done(&simplify)));
+    let simplified = done(&[&simplify[..], &["-o", &axis]].concat()).replace(&axis, "qmat.ma");
+    insta::assert_snapshot!("simplify", without_timings(&simplified));
     insta::assert_snapshot!("axis", without_timings(&done(&["axis", "builtin:capsule"])));
 }
 
@@ -135,7 +149,7 @@ fn absurd_requests_are_refused_at_once() {
         (&["simplify", mesh, "-m", "qmat", "-o", &nowhere], 1, "there is no folder"),
         (&["simplify", mesh, "-m", "qmat", "-o", "x.xyz"], 1, "\"xyz\" is not one of"),
         (&["simplify", mesh, "-m", "qmat", "--max-error", "inf"], 2, "inf"),
-        (&["simplify", mesh, "-m", "qmat", "--set", "k=x"], 2, "k = \"x\""),
+        (&["simplify", mesh, "-m", "qmat", "--set", "k=x", "-o", "x.ma"], 2, "k = \"x\""),
         (&["simplify", "builtin:nothing", "-m", "qmat"], 2, "`nothing`"),
     ];
     cases.into_iter().for_each(|(arguments, code, part)| refused(arguments, code, part));

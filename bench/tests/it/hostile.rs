@@ -98,7 +98,10 @@ fn slips_are_refused_with_what_was_meant() {
     for (arguments, expected) in [
         (&["simplify", sphere, "-m", "qmat", "--max-error", "5"][..], "write 0.05 for 5 %"),
         (&["simplify", sphere, "-m", "qmat", "--max-error", "1"], "write 0.01 for 1 %"),
-        (&["simplify", sphere, "-m", "hem", "--level", "inf"], "inf is not a distance"),
+        (
+            &["simplify", sphere, "-m", "hem", "--level", "inf", "-o", "x.ma"],
+            "inf is not a distance",
+        ),
         (&["simplify", sphere, "-m", "qmta"], "did you mean `qmat`?"),
         (&["methods", "dey-zhoa"], "did you mean `dey-zhao`?"),
         (&["info", "builtin:shpere"], "did you mean `sphere`?"),
@@ -111,12 +114,10 @@ fn slips_are_refused_with_what_was_meant() {
 }
 
 #[test]
-fn a_result_that_is_not_kept_is_told() {
+fn a_result_without_a_file_is_refused_before_it_is_computed() {
     let simplify = ["simplify", "builtin:sphere:8", "-m", "qmat", "--spheres", "5"];
-    assert!(run(&simplify).2.contains("the result was not written; -o FILE.ma keeps it"));
-    for quiet in ["--quiet", "--json"] {
-        assert_eq!(run(&[&simplify[..], &[quiet]].concat()).2, "");
-    }
+    refused(&simplify, 2, "write it with -o sphere-8-qmat.ma");
+    assert_eq!(run(&[&simplify[..], &["--json"]].concat()).0, 0);
 }
 
 #[test]
