@@ -148,7 +148,9 @@ pub fn command() -> Command {
             help.push_str(&format!("  {verb:<13}{about}\n"));
         }
     }
-    help.push_str("\nGlobal options:\n{options}\n\n`medial VERB --help` describes the options of a verb.\n");
+    help.push_str(
+        "\nGlobal options:\n{options}\n\n`medial VERB --help` describes the options of a verb.\n",
+    );
     command.help_template(help)
 }
 

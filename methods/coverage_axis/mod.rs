@@ -35,9 +35,8 @@
 //! - Two spheres chosen that are nearest to one vertex of the initial mesh are an error in the authors' way
 //!   of connecting them, and happen with random candidates alone: the second takes the nearest vertex that
 //!   is free, and is counted.
-//! - A number of spheres ends the greedy choice early, or, with `size=dilation` and for exact covers, is
-//!   met by a search on `delta`: the greedy choice that covers earlier delivers fewer than asked, as balls
-//!   beyond cover nothing new.
+//! - A number of spheres ends the greedy choice early. Where fewer spheres cover everything, with
+//!   `size=dilation` and for exact covers, it is met by a search on `delta`.
 //! - The exact cover is sought by another solver than the authors', after reductions that keep the
 //!   optimum. Smallest covers are not unique, so the spheres are others; their number is the same where
 //!   the search ends with a proof, which the counts `cover_bound` and `spheres` tell.
@@ -161,15 +160,13 @@ impl Simplification for PreparedCoverage {
             Level::Native(delta) => (level_within("delta", delta, DILATIONS)?, max_iter),
             Level::Published => (dilation, max_iter.min(PUBLISHED_PICKS)),
         };
-        let Probe { mesh, mut diagnostics } = axis.at(dilation, most)?;
-        if let Level::Spheres(asked) = level
-            && mesh.spheres.len() < asked
+        let Probe { mesh, diagnostics } = axis.at(dilation, most)?;
+        if let Level::Spheres(count) = level
+            && mesh.spheres.len() < count
         {
-            let reached = mesh.spheres.len();
-            diagnostics.warn(format!(
-                "{reached} spheres instead of {asked}: they cover all samples that can be covered at \
-                 delta = {dilation}; a smaller dilation or size=dilation takes more"
-            ));
+            // These cover everything: more spheres need a smaller dilation.
+            let most = max_iter.max(2 * count);
+            return search.at(count, f64::recip, |value| axis.at(value.recip(), most));
         }
         let native_level = Some(dilation);
         Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, level) })
@@ -356,8 +353,8 @@ pub enum Penalty {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Size {
-    /// The first spheres that the greedy choice takes; the exact choice has no order, and searches on
-    /// the dilation.
+    /// The first spheres of the greedy choice; where fewer cover everything, and for the exact choice,
+    /// which has no order, a search on the dilation.
     Picks,
     /// A search on the dilation, until so many cover everything.
     Dilation,

@@ -51,8 +51,9 @@
 //! # Deviations from the programs
 //!
 //! - Both programs refit another energy than they cluster by: the Euclidean rows are multiplied by `lambda`
-//!   instead of its square root, and the plane distances of a point are summed before they are squared.
-//!   By default the refit minimises the energy above; `refit=published` does as they do.
+//!   instead of its square root, and the plane distances of a point are summed before they are squared. So
+//!   does the default. `refit=energy` minimises the energy above, and has the larger errors at 100 spheres.
+//! - `points=auto` takes samples where the mesh has fewer than 25 vertices for each requested sphere.
 //! - The refit starts from the current sphere. CGAL's starts from memory that was never set. A
 //!   step that would raise the sum of errors is halved.
 //! - A shrinking ball always begins with the radius `side`, where the authors take 0.5 and in step 3 0.25 of
@@ -99,6 +100,9 @@ const PUBLISHED: usize = 100;
 
 /// Samples for each sphere: fewer do not carry it, by CGAL's manual.
 const SAMPLES_PER_SPHERE: usize = 100;
+
+/// With `points=auto`, fewer vertices for each sphere than this call for samples.
+const VERTICES_PER_SPHERE: usize = 25;
 
 /// Most samples that a number of spheres asks for by itself: memory and time stay bounded.
 const MOST_DEFAULT_SAMPLES: usize = 100_000;
@@ -153,13 +157,14 @@ impl Simplification for PreparedVmas<'_> {
                 return Err(SimplifyError::unsupported(why));
             }
         };
-        let points = self.points(asked)?;
+        let params = self.params.resolved(asked, self.shape.mesh().vertices.len());
+        let points = self.points(asked, params)?;
         // Each sphere needs points of its own.
-        let target = asked.min(match self.params.points {
+        let target = asked.min(match params.points {
             Points::Samples => (points.len() / SAMPLES_PER_SPHERE).max(1),
-            Points::Vertices => points.len(),
+            _ => points.len(),
         });
-        let mut sampling = VariationalSampling::new(&points, &self.solid, self.params);
+        let mut sampling = VariationalSampling::new(&points, &self.solid, params);
         let ended = sampling.run(target, &self.run)?;
         let mesh = sampling.mesh(self.params.connect)?;
         let mut diagnostics = Diagnostics::default();
@@ -171,15 +176,15 @@ impl Simplification for PreparedVmas<'_> {
 
 impl PreparedVmas<'_> {
     /// Step 0.
-    fn points(&self, spheres: usize) -> Result<SurfacePoints> {
-        let (mesh, VmasParams { samples, neighbours, .. }) = (self.shape.mesh(), self.params);
-        let points = match self.params.points {
-            Points::Vertices => SurfacePoints::of_vertices(mesh),
+    fn points(&self, spheres: usize, params: VmasParams) -> Result<SurfacePoints> {
+        let (mesh, VmasParams { samples, neighbours, .. }) = (self.shape.mesh(), params);
+        let points = match params.points {
             Points::Samples => {
                 let count = spheres.saturating_mul(SAMPLES_PER_SPHERE);
                 let count = count.min(MOST_DEFAULT_SAMPLES).max(samples);
                 SurfacePoints::of_samples(mesh, count, self.run.seed, neighbours)
             }
+            _ => SurfacePoints::of_vertices(mesh),
         };
         if points.len() == 0 {
             return Err(SimplifyError::unsupported("the surface has no area"));
@@ -231,12 +236,12 @@ impl Tally {
 // The parameters of VMAS.
 
 medial::parameters! {
-    /// Parameters of VMAS; the defaults are CGAL's, with the refit that minimises the energy as
-    /// written.
+    /// Parameters of VMAS; the defaults are those of the authors' program.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct VmasParams {
-        /// Surface points: area-uniform samples (CGAL), or the vertices of the mesh (the authors).
-        points: Points = Points::Samples, "samples or vertices";
+        /// Surface points: the vertices of the mesh (the authors), area-uniform samples (CGAL), or the
+        /// vertices where there are enough for the requested spheres.
+        points: Points = Points::Auto, "auto, vertices or samples";
         /// Smallest number of samples; 100 for each sphere if that is more, up to 100000.
         samples: usize = 20_000, "samples";
         /// Nearest samples that a sample is adjacent to, itself included.
@@ -244,9 +249,9 @@ medial::parameters! {
         /// Weight of the Euclidean part of the energy, above 0 and at most 1; with a small one,
         /// spheres reach into features.
         lambda: f64 = 0.2, "pure number";
-        /// The refit minimises the energy as written, or as both published programs do: lambda
-        /// squared, plane distances summed before they are squared.
-        refit: Refit = Refit::Energy, "energy or published";
+        /// The refit minimises what both published programs do (lambda squared, plane distances summed
+        /// before they are squared), or the energy as written.
+        refit: Refit = Refit::Published, "published or energy";
         /// A shrinking ball touches surface points, or the mesh: exact, but slower.
         contact: Contact = Contact::Samples, "samples or mesh";
         /// Faces: all triples of spheres adjacent in pairs (published), or only where three clusters
@@ -261,6 +266,8 @@ medial::parameters! {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Points {
+    /// The vertices where there are at least 25 for each requested sphere, or else samples.
+    Auto,
     /// Area-uniform samples, each adjacent to its nearest ones (CGAL).
     Samples,
     /// The vertices of the mesh, adjacent along its edges (the authors).
@@ -301,6 +308,18 @@ pub enum Connect {
 const MOST_SAMPLES: usize = 1_000_000;
 
 impl VmasParams {
+    /// With the kind of points for a number of spheres on a mesh of so many vertices.
+    fn resolved(self, spheres: usize, vertices: usize) -> Self {
+        let points = match self.points {
+            Points::Auto if vertices < VERTICES_PER_SPHERE.saturating_mul(spheres) => {
+                Points::Samples
+            }
+            Points::Auto => Points::Vertices,
+            points => points,
+        };
+        Self { points, ..self }
+    }
+
     fn validate(self) -> Result<Self> {
         within("samples", self.samples, 100..=MOST_SAMPLES)?;
         within("neighbours", self.neighbours, 2..=100)?;

@@ -79,7 +79,7 @@ impl<'a> VariationalSampling<'a> {
         let mut tally = Tally::default();
         let ball = match params.points {
             Points::Samples => solid.ball_at(points, points.first as usize),
-            Points::Vertices => largest_ball(points, solid),
+            _ => largest_ball(points, solid),
         };
         ball.iter().for_each(|ball| tally.count(ball));
         // Any sphere will do: the first refit leaves nothing of it but its basin of attraction.
@@ -130,7 +130,7 @@ impl<'a> VariationalSampling<'a> {
         assign(self.points, self.energy, &self.spheres, &mut self.labels);
         let before = self.spheres.len();
         // The authors drop fewer than 4 points, CGAL fewer than 5.
-        let least = if self.params.points == Points::Vertices { 4 } else { 5 };
+        let least = if self.params.points == Points::Samples { 5 } else { 4 };
         let clusters = drop_small(&mut self.spheres, &mut self.labels, least);
         self.tally.dropped += before - self.spheres.len();
         clusters
