@@ -52,8 +52,11 @@ pub const ROUNDING: f64 = 1e-9;
 /// Finer intervals than this, in diagonals, are refused: rounding would be a part of them.
 pub const FINEST: f64 = 1e-6;
 
-/// Bound on the pieces of a round: about 2 GB.
-const MAX_PIECES: usize = 1 << 24;
+/// Bounds on the pieces of a round for small inputs and for any: about 0.7 and 2 GB.
+const MAX_PIECES: [usize; 2] = [1 << 22, 1 << 24];
+
+/// Between these bounds, the pieces of a round for each piece to begin with.
+const MAX_GROWTH: usize = 64;
 
 /// An interval that holds the Hausdorff distance between a surface and the boundary of a union.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -175,6 +178,8 @@ struct Search {
 
 impl Search {
     fn run<S: Side>(&mut self, side: &S, mut pieces: Vec<S::Piece>) -> Result<(), MetricError> {
+        // A few bytes of input must not take minutes before they are refused.
+        let most = (MAX_GROWTH * pieces.len()).clamp(MAX_PIECES[0], MAX_PIECES[1]);
         while !pieces.is_empty() {
             self.pieces += pieces.len() as u64;
             let (known, enough) = (self.lower, self.lower + self.goal);
@@ -197,10 +202,10 @@ impl Search {
                     self.upper = self.upper.max(bound.upper);
                 } else {
                     side.divide(piece, &mut parts);
+                    if parts.len() > most {
+                        return Err(MetricError::TooFine { tolerance: self.goal, pieces: most });
+                    }
                 }
-            }
-            if parts.len() > MAX_PIECES {
-                return Err(MetricError::TooFine { tolerance: self.goal, pieces: parts.len() });
             }
             pieces = parts;
         }

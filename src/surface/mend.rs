@@ -261,6 +261,8 @@ struct Weight {
 struct Best {
     weight: Weight,
     middle: usize,
+    /// Unit normal of that triangle.
+    normal: Vec3,
 }
 
 /// A loop with what surrounds it.
@@ -325,13 +327,17 @@ impl<'a> Patch<'a> {
         }
         let mut best: Option<Best> = None;
         for middle in i + 1..k {
-            let triangle = [i, middle, k].map(|corner| self.points[corner]);
-            let own = normal(triangle);
             let (Some(low), Some(high)) = (self.chain(i, middle), self.chain(middle, k)) else {
                 continue;
             };
-            let mut angle = low.0.angle.max(high.0.angle);
-            angle = angle.max(between(own, low.1)).max(between(own, high.1));
+            let angle = low.0.angle.max(high.0.angle);
+            // Angles come first: most triangles need not be looked at.
+            if best.is_some_and(|best| angle > best.weight.angle) {
+                continue;
+            }
+            let triangle = [i, middle, k].map(|corner| self.points[corner]);
+            let own = normal(triangle);
+            let mut angle = angle.max(between(own, low.1)).max(between(own, high.1));
             if whole {
                 angle = angle.max(between(own, self.beside[n - 1]));
             }
@@ -339,7 +345,7 @@ impl<'a> Patch<'a> {
             let area = low.0.area + high.0.area + (b - a).cross(c - a).length() * 0.5;
             let weight = Weight { angle, area };
             if best.is_none_or(|best| weight < best.weight) {
-                best = Some(Best { weight, middle });
+                best = Some(Best { weight, middle, normal: own });
             }
         }
         best
@@ -350,8 +356,7 @@ impl<'a> Patch<'a> {
         if k == i + 1 {
             return Some((Weight { angle: 0.0, area: 0.0 }, self.beside[i]));
         }
-        let Best { weight, middle } = self.best[i * self.corners.len() + k]?;
-        Some((weight, normal([i, middle, k].map(|corner| self.points[corner]))))
+        self.best[i * self.corners.len() + k].map(|best| (best.weight, best.normal))
     }
 }
 
