@@ -55,6 +55,11 @@
 //! first collapse whose local error exceeds `1e-4`. It guarantees no bound, and reports the error of
 //! the result.
 //!
+//! The error can rise with the number of spheres. A primitive of the start that sticks out of the surface
+//! makes every collapse next to it expensive, so it stays until late: on the built-in torus the start and
+//! the result at 1,000 spheres share a two-sided error of 2.4 % at one place, and at 100 spheres, when that
+//! place is collapsed, 0.5 % is left. A start without such places has no such rise.
+//!
 //! # Laziness
 //!
 //! An edge is queued at a lower bound of its cost, the error of one sample in each direction. When it
