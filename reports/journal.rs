@@ -69,7 +69,20 @@ impl Journal {
     }
 }
 
+/// Refuses a path to what is no regular file: a pipe could be read for ever, a device without end. A path to nothing is
+/// left to the reader.
+///
+/// # Errors
+/// When something else is there.
+pub fn check_regular(path: &Path) -> io::Result<()> {
+    match fs::metadata(path) {
+        Ok(target) if !target.is_file() => Err(io::Error::other("not a regular file")),
+        _ => Ok(()),
+    }
+}
+
 fn open_for_lines(path: &Path) -> io::Result<File> {
+    check_regular(path)?;
     let mut file = OpenOptions::new().read(true).append(true).create(true).open(path)?;
     if file.metadata()?.len() > 0 {
         let mut last = [0];
@@ -119,8 +132,8 @@ impl std::fmt::Display for BadLine {
 /// # Errors
 /// [`JournalError::Io`] when the file cannot be read.
 pub fn read_records(path: &Path) -> Result<Journaled, JournalError> {
-    let bytes =
-        fs::read(path).map_err(|source| JournalError::Io { path: path.to_owned(), source })?;
+    let bytes = check_regular(path).and_then(|()| fs::read(path));
+    let bytes = bytes.map_err(|source| JournalError::Io { path: path.to_owned(), source })?;
     Ok(parse_records(&bytes))
 }
 

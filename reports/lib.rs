@@ -40,7 +40,8 @@ mod write;
 
 pub use header::{Header, MethodNote, RunNote};
 pub use journal::{
-    BadLine, Journal, JournalError, Journaled, parse_records, read_records, write_records,
+    BadLine, Journal, JournalError, Journaled, check_regular, parse_records, read_records,
+    write_records,
 };
 pub use metric::{Better, METRICS, Metric, measured_rows};
 pub use pictures::{PictureStrip, picture_strips};

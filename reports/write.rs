@@ -11,7 +11,7 @@ use base64::prelude::BASE64_STANDARD;
 use crate::answers::{by_bound, equal_error_figure, equal_error_table, purpose_table};
 use crate::comparison::Comparison;
 use crate::header::Header;
-use crate::journal::replace_file;
+use crate::journal::{check_regular, replace_file};
 use crate::page::{MeshPart, MeshView, Page};
 use crate::pictures::{FOLDER, PictureStrip, VIEWS, strips};
 use crate::plots::{Figure, mean_figures, mesh_figures};
@@ -161,7 +161,8 @@ fn view(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option<Me
 /// [`ReportError::Io`] when the file is missing or is no header.
 pub fn read_header(dir: &Path) -> Result<Header, ReportError> {
     let path = dir.join("header.json");
-    (fs::read(&path).and_then(|bytes| serde_json::from_slice(&bytes).map_err(io::Error::from)))
+    let bytes = check_regular(&path).and_then(|()| fs::read(&path));
+    (bytes.and_then(|bytes| serde_json::from_slice(&bytes).map_err(io::Error::from)))
         .map_err(|source| ReportError::Io { path, source })
 }
 

@@ -5,8 +5,8 @@
 //! 2. **What is deterministic** (`results`): results, errors, counts, topology. Compared exactly; every change is listed,
 //!    and called a regression where it is for the worse by more than its threshold.
 //! 3. **Seconds** (`timing`): the same work takes other seconds each time. A slowdown in CPU seconds is called a
-//!    regression only if it is larger than a threshold, its bootstrap interval excludes none at all, and the repetitions
-//!    agree. Wall-clock seconds are shown and are no gate.
+//!    regression only if its confidence interval lies beyond a threshold, and the repetitions agree. Wall-clock seconds
+//!    are shown and are no gate.
 
 mod results;
 mod text;

@@ -120,9 +120,9 @@ fn timing_table(diff: &Diff) -> Table {
         }
     };
     let note = format!(
-        "The methods' own seconds, without shared substrates. Slower or faster: by more than {:.0} % of CPU seconds \
-         ({:.0} % on a single mesh), in the mean and by the fastest repetitions, with an interval that excludes 1, and \
-         nine of ten repetitions on that side. {together}",
+        "The methods' own seconds, without shared substrates. Slower or faster: the whole interval is beyond {:.0} % of \
+         CPU seconds ({:.0} % on a single mesh), the fastest repetitions differ by as much, and nine of ten repetitions \
+         agree. All intervals hold together with a probability of 99 %. {together}",
         100.0 * options.seconds,
         200.0 * options.seconds // one mesh has fewer results to average
     );

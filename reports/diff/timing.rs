@@ -3,23 +3,25 @@
 //! One number for each repetition: the mean, over the results of a method, of the logarithm of new over old CPU seconds.
 //! Over the repetitions of these numbers, a slowdown is a regression only if
 //!
-//! 1. its mean is beyond the threshold,
-//! 2. the percentile bootstrap interval of the mean excludes no change at all (B. Efron, R. J. Tibshirani: *An
-//!    Introduction to the Bootstrap*, 1993, chapter 13), and
-//! 3. nine of ten repetitions agree that it is slower, and
-//! 4. the fastest repetitions of both sides differ by more than the threshold, too: another program on the machine
+//! 1. the confidence interval of their mean lies beyond the threshold as a whole (Student's t distribution, with
+//!    Welch's degrees of freedom for sides that are not paired: few repetitions give a wide interval),
+//! 2. nine of ten repetitions agree that it is slower, and
+//! 3. the fastest repetitions of both sides differ by more than the threshold, too: another program on the machine
 //!    delays some repetitions, hardly ever all.
 //!
+//! A difference has dozens of rows, of which none may raise a false alarm: the intervals hold together (C. E. Bonferroni,
+//! 1936), so that each is wider the more rows there are.
+//!
 //! With builds that ran alternately, repetition `k` of one is compared with repetition `k` of the other: whatever
-//! slowed the machine in that moment slowed both. Otherwise both sides are resampled by themselves, and a machine that
-//! was busier on one of the two days cannot be told from a slower program.
+//! slowed the machine in that moment slowed both. Otherwise a machine that was busier on one of the two days cannot be
+//! told from a slower program.
 //!
 //! The method's own time counts. Substrates, which methods share, have their own row. Wall-clock seconds are shown and
 //! have no meaning here.
 
 use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_2;
 
-use medial::geometry::hash::splitmix;
 use serde::Serialize;
 
 use super::results::Pair;
@@ -30,14 +32,11 @@ use crate::record::{Record, Repetition, Stages};
 /// With fewer repetitions nothing is said.
 const LEAST_REPETITIONS: usize = 5;
 
-/// Level of the interval.
-const CONFIDENCE: f64 = 0.99;
+/// Probability that any interval of a difference misses its ratio, at most.
+const ERROR_RATE: f64 = 0.01;
 
 /// Share of the repetitions that have to agree.
 const AGREEMENT: f64 = 0.9;
-
-/// Resamples of the bootstrap.
-const RESAMPLES: usize = 2000;
 
 /// Shorter times are not compared: they are of the size of what the clock and the caches do.
 const LEAST_SECONDS: f64 = 2e-3;
@@ -60,7 +59,7 @@ pub struct Timing {
     pub repetitions: usize,
     /// New over old seconds, the geometric mean.
     pub ratio: f64,
-    /// The interval of this ratio.
+    /// The interval of this ratio: all of one clock hold together with a probability of 99 %.
     pub interval: [f64; 2],
     /// Share of the repetitions that are on the same side of 1 as the ratio.
     pub agreement: f64,
@@ -109,9 +108,11 @@ pub(super) fn timings(pairs: &[Pair<'_>], options: &DiffOptions) -> (Vec<Timing>
             with_result - repeated.len()
         ));
     }
-    let rows = groups(&repeated)
-        .into_iter()
-        .flat_map(|group| CLOCKS.iter().filter_map(move |clock| group.timing(clock, options)));
+    let groups = groups(&repeated);
+    let error_rate = ERROR_RATE / groups.len() as f64;
+    let rows = groups.iter().flat_map(|group| {
+        CLOCKS.iter().filter_map(move |clock| group.timing(clock, options, error_rate))
+    });
     // Rows of single meshes that mean nothing would bury the others.
     (rows.filter(|row| row.mesh.is_none() || row.meaning.is_some()).collect(), untimed)
 }
@@ -179,6 +180,7 @@ impl Group<'_, '_> {
         &self,
         &(name, clock, is_gate): &(&'static str, Clock, bool),
         options: &DiffOptions,
+        error_rate: f64,
     ) -> Option<Timing> {
         // For each pair the seconds of the repetitions of both sides, where these take long enough.
         let mut pairs: Vec<[Vec<f64>; 2]> = (self.pairs.iter())
@@ -199,16 +201,20 @@ impl Group<'_, '_> {
         });
         let least = |seconds: &[f64]| seconds.iter().copied().fold(f64::INFINITY, f64::min);
         let fastest = mean_logarithm(1, &least) - mean_logarithm(0, &least);
-        let Shift { mean, interval, agreement } = Shift::new(&old, &new, options.alternating);
+        let shift = Shift::new(&old, &new, options.alternating, error_rate);
+        let Shift { mean, interval, agreement } = shift;
         let alone = if self.mesh.is_some() { 2.0 } else { 1.0 };
         let threshold = (alone * options.seconds).ln_1p();
-        // The smaller of the two shifts, where they have one sign.
-        let least = if mean * fastest > 0.0 { mean.abs().min(fastest.abs()) } else { 0.0 };
-        let is_certain = agreement >= AGREEMENT && interval[0] * interval[1] > 0.0;
-        let meaning = (is_gate && least > threshold && is_certain).then_some(match mean > 0.0 {
-            true => Meaning::Regression,
-            false => Meaning::Improvement,
-        });
+        let evidence = [interval[0], interval[1], fastest];
+        let meaning = if !is_gate || agreement < AGREEMENT {
+            None
+        } else if evidence.iter().all(|&shift| shift > threshold) {
+            Some(Meaning::Regression)
+        } else if evidence.iter().all(|&shift| shift < -threshold) {
+            Some(Meaning::Improvement)
+        } else {
+            None
+        };
         Some(Timing {
             method: self.method.clone(),
             mesh: self.mesh.clone(),
@@ -231,24 +237,21 @@ struct Shift {
 }
 
 impl Shift {
-    /// In pairs, or each side by itself.
-    fn new(old: &[f64], new: &[f64], in_pairs: bool) -> Self {
+    /// In pairs, or each side by itself; an interval that misses the true shift with a probability of `error_rate`.
+    fn new(old: &[f64], new: &[f64], in_pairs: bool, error_rate: f64) -> Self {
         let count = old.len(); // the same on both sides
-        let mean = mean_of(new.iter()) - mean_of(old.iter());
-        let mut means: Vec<f64> = (0..RESAMPLES)
-            .map(|resample| {
-                // In pairs both sides draw the same repetitions. Splitmix instead of a generator: no state, no seed.
-                let [old, new] = [(0, old), (usize::from(!in_pairs), new)].map(|(side, values)| {
-                    mean_of((0..count).map(|k| {
-                        let number = ((resample * 2 + side) * count + k) as u64;
-                        &values[(splitmix(number) % count as u64) as usize]
-                    }))
-                });
-                new - old
-            })
-            .collect();
-        means.sort_by(f64::total_cmp); // percentiles
-        let tail = (0.5 * (1.0 - CONFIDENCE) * RESAMPLES as f64) as usize;
+        let least_freedom = count - 1;
+        let differences: Vec<f64> = new.iter().zip(old).map(|(new, old)| new - old).collect();
+        let mean = mean_of(&differences);
+        let (variance, freedom) = if in_pairs {
+            (variance_of(&differences), least_freedom)
+        } else {
+            let [a, b] = [old, new].map(variance_of);
+            // Welch's, for samples of one size; not a number where nothing varies.
+            let freedom = least_freedom as f64 * (a + b).powi(2) / (a * a + b * b);
+            (a + b, (freedom as usize).max(least_freedom))
+        };
+        let reach = student_quantile(error_rate, freedom) * (variance / count as f64).sqrt();
         let (mut agreeing, mut compared) = (0, 0);
         for (i, a) in old.iter().enumerate() {
             for (k, b) in new.iter().enumerate() {
@@ -260,11 +263,62 @@ impl Shift {
             }
         }
         let agreement = agreeing as f64 / compared.max(1) as f64;
-        Self { mean, interval: [means[tail], means[RESAMPLES - 1 - tail]], agreement }
+        Self { mean, interval: [mean - reach, mean + reach], agreement }
     }
 }
 
-fn mean_of<'a>(values: impl ExactSizeIterator<Item = &'a f64>) -> f64 {
-    let count = values.len().max(1) as f64;
-    values.sum::<f64>() / count
+fn mean_of(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// Of a sample.
+fn variance_of(values: &[f64]) -> f64 {
+    let mean = mean_of(values);
+    let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+    squares / (values.len() - 1).max(1) as f64
+}
+
+/// The value that a number of Student's t distribution exceeds in size with a probability, for two or more degrees of
+/// freedom.
+fn student_quantile(probability: f64, freedom: usize) -> f64 {
+    // By bisection over the angle whose tangent is t over the root of `freedom`, to the last bit.
+    let (mut low, mut high) = (0.0, FRAC_PI_2);
+    for _ in 0..f64::MANTISSA_DIGITS {
+        let middle = 0.5 * (low + high);
+        match 1.0 - student_within(middle, freedom) > probability {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    (freedom as f64).sqrt() * low.tan()
+}
+
+/// The probability that the angle is smaller in size: M. Abramowitz, I. A. Stegun, *Handbook of Mathematical Functions*,
+/// 1964, equations 26.7.3 and 26.7.4.
+fn student_within(angle: f64, freedom: usize) -> f64 {
+    let (sine, cosine) = angle.sin_cos();
+    let is_odd = freedom % 2 == 1;
+    let mut term = if is_odd { cosine } else { 1.0 };
+    let mut sum = term;
+    // A series in powers of the cosine: each term follows from the one before.
+    for power in (2..freedom - 1).filter(|power| (power % 2 == 1) == is_odd) {
+        term *= cosine * cosine * (power - 1) as f64 / power as f64;
+        sum += term;
+    }
+    if is_odd { (angle + sine * sum) / FRAC_PI_2 } else { sine * sum }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::student_quantile;
+
+    #[test]
+    fn quantiles_are_those_of_the_tables() {
+        for (probability, freedom, expected) in
+            [(0.01, 4, 4.6041), (0.01, 9, 3.2498), (0.001, 5, 6.8688), (0.05, 30, 2.0423)]
+        {
+            let quantile = student_quantile(probability, freedom);
+            assert!((quantile - expected).abs() < 1e-4, "{probability}, {freedom}: {quantile}");
+        }
+    }
 }

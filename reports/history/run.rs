@@ -11,7 +11,7 @@ use std::{fs, io};
 use serde::{Deserialize, Serialize};
 
 use crate::comparison::row_name;
-use crate::journal::replace_file;
+use crate::journal::{check_regular, replace_file};
 use crate::metric::median;
 use crate::record::{Machine, Record, Stages, Status};
 use crate::text::printable;
@@ -142,7 +142,7 @@ impl Run {
         let path = folder.join(self.file_name());
         let failed = |error: io::Error| HistoryError::file(&path, error);
         let text = serde_json::to_string(self).map_err(|error| failed(error.into()))? + "\n";
-        match fs::read_to_string(&path) {
+        match check_regular(&path).and_then(|()| fs::read_to_string(&path)) {
             Ok(old) if old == text => return Ok((path, false)),
             Ok(_) => {
                 let message =
@@ -157,7 +157,8 @@ impl Run {
     }
 
     fn read(path: &Path) -> Result<Self, HistoryError> {
-        let text = fs::read_to_string(path).map_err(|error| HistoryError::file(path, error))?;
+        let text = check_regular(path).and_then(|()| fs::read_to_string(path));
+        let text = text.map_err(|error| HistoryError::file(path, error))?;
         let run: Self =
             serde_json::from_str(&text).map_err(|error| HistoryError::file(path, error))?;
         let Self { date, commit, .. } = &run;

@@ -46,6 +46,47 @@ fn equal_records_are_silent_and_noise_is_no_regression() {
     }
 }
 
+/// Records of a machine with two endless loops: in each repetition all CPU seconds of a build are longer by up
+/// to a fifth, in one of ten by another half, and the clock on the wall runs up to three times as long.
+fn busy(seed: usize, repetitions: usize, factor: f64) -> Vec<Record> {
+    let mut records = comparison(&SHAPES[..4], &METHODS, &[500, 100]);
+    for (place, record) in records.iter_mut().enumerate() {
+        let Some(stages) = record.simplify.seconds else { continue };
+        let lap = |k: usize| {
+            let noise = |what| common::noise(seed, k, what);
+            let share = factor * (1.0 + 0.2 * noise(1)) * if noise(2) < 0.1 { 1.5 } else { 1.0 };
+            let share = share * (1.0 + 0.05 * common::noise(seed, place, k + 77));
+            let by = |share: f64| {
+                let Stages { substrate, prepare, simplify, .. } = stages;
+                Stages::new(share * substrate, share * prepare, share * simplify)
+            };
+            Repetition { seconds: by(share * (1.0 + 2.0 * noise(3))), cpu_seconds: by(share) }
+        };
+        record.repetitions = (0..repetitions).map(lap).collect();
+    }
+    records
+}
+
+#[test]
+fn a_busy_machine_is_no_regression_and_a_slow_build_is_one_nevertheless() {
+    let silent = |alternating| {
+        let options = DiffOptions { alternating, ..DiffOptions::default() };
+        let names = || ["before".to_owned(), "after".to_owned()];
+        (0..200).all(|seed| {
+            let diff = Diff::new(names(), &busy(seed, 5, 1.0), &busy(seed + 1000, 5, 1.0), options);
+            let wall = diff.timings.iter().filter(|timing| timing.clock == "wall");
+            assert!(wall.clone().count() >= 4 && wall.clone().all(|t| t.meaning.is_none()));
+            diff.count(Meaning::Regression) + diff.count(Meaning::Improvement) == 0
+        })
+    };
+    assert!(silent(true) && silent(false));
+    let found = (0..20).filter(|&seed| {
+        diff(&busy(seed, 10, 1.0), &busy(seed + 1000, 10, 1.8)).count(Meaning::Regression) >= 4
+    });
+    let found = found.count();
+    assert!(found >= 15, "{found} of 20");
+}
+
 #[test]
 fn a_slower_method_is_named_alone() {
     let slower = |record: &Record| if record.simplify.method == "angle" { 1.15 } else { 1.0 };

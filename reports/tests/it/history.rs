@@ -90,6 +90,21 @@ fn runs_are_stored_once_and_read_back_in_order() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn a_pipe_among_the_files_is_left_out_unread() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = &runs(1, |_, _, _| {})[0];
+    run.add_to(folder.path()).expect("added");
+    let pipe = folder.path().join("2026-01-09-00000000.json");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().expect("runs").success());
+    let (read, damaged) = read_runs(folder.path()).expect("a history");
+    assert_eq!((read.len(), damaged.len()), (1, 1));
+    assert!(damaged[0].to_string().ends_with("00000000.json: not a regular file"));
+    let error = medial_reports::read_records(&pipe).expect_err("a pipe");
+    assert!(error.to_string().ends_with("not a regular file"), "{error}");
+}
+
 #[test]
 fn records_of_more_than_one_run_are_refused() {
     let refused = |records: &[Record], commit: &str, date: &str| {
