@@ -31,6 +31,8 @@ struct Written {
     params: Vec<Spanned<WrittenParam>>,
     #[serde(default)]
     fit: OutputUnits,
+    #[serde(default)]
+    files: Vec<Spanned<String>>,
 }
 
 /// The units of an output.
@@ -97,6 +99,8 @@ pub(super) struct Declaration {
     pub arguments: Vec<Word>,
     /// Where the program runs, and relative paths start.
     pub folder: PathBuf,
+    /// Files that the program reads beside those that are words of its command.
+    pub files: Vec<PathBuf>,
 }
 
 /// Why a file of plug-ins is refused: the file, the line, and what to do.
@@ -168,12 +172,16 @@ pub(super) fn taken_id(id: &str) -> String {
 }
 
 pub(super) fn wrong_id(id: &str) -> String {
-    format!("the id {id:?} is not made of lower-case letters, digits and hyphens; choose another")
+    format!(
+        "the id {id:?} is not made of lower-case letters, digits and inner hyphens; choose another"
+    )
 }
 
 /// Whether a text would do as an id on the command line.
 pub(crate) fn is_id(text: &str) -> bool {
     !text.is_empty()
+        // The command line would take it for an option.
+        && !text.starts_with('-')
         && text.bytes().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == b'-')
 }
 
@@ -213,6 +221,14 @@ impl Written {
             arguments.push(parsed);
         }
         self.check_passed(&arguments)?;
+        for file in &self.files {
+            let path = folder.join(file.get_ref());
+            if !path.is_file() {
+                let message =
+                    format!("there is no regular file {}; correct `files`", path.display());
+                return fault(file.span(), message);
+            }
+        }
         Ok(Declaration {
             id: self.id.into_inner(),
             title: self.title,
@@ -225,6 +241,7 @@ impl Written {
             program,
             arguments,
             folder: folder.to_owned(),
+            files: self.files.iter().map(|file| folder.join(file.get_ref())).collect(),
         })
     }
 

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
 use std::sync::Arc;
 
@@ -56,10 +56,28 @@ impl External {
         Ok(Self { info, declaration: Arc::new(declaration), fingerprint })
     }
 
-    /// SHA-256 over the declaration and the files that its command names: an edited script is not
+    /// SHA-256 over the declaration and its files: an edited script is not
     /// taken for the old one.
     pub fn fingerprint(&self) -> &str {
         &self.fingerprint
+    }
+
+    /// On files that the command names inside of a word, such as `--in=in.ma` or a script in a line for a shell, and that
+    /// the fingerprint does not cover.
+    pub fn remark(&self) -> Option<String> {
+        let Declaration { id, folder, arguments, .. } = &*self.declaration;
+        let covered: Vec<_> = files(&self.declaration).flat_map(fs::canonicalize).collect();
+        let is_end = |c: char| c.is_whitespace() || "=,;:'\"()<>|&".contains(c);
+        let texts: Vec<String> = arguments.iter().map(|word| word.fill(|_| " ".into())).collect();
+        let mut names: Vec<&str> = texts.iter().flat_map(|text| text.split(is_end)).collect();
+        names.retain(|name| {
+            let path = fs::canonicalize(folder.join(name));
+            path.is_ok_and(|path| path.is_file() && !covered.contains(&path))
+        });
+        (!names.is_empty()).then(|| {
+            let names = names.join(", ");
+            format!("plug-in {id}: changes of {names} rerun nothing; list them in `files = [...]`")
+        })
     }
 
     /// The text of every parameter: as it was set, or the default.
@@ -268,21 +286,40 @@ impl PreparedProgram<'_> {
             loaded.mesh = fit.similarity.mesh(&loaded.mesh);
             loaded.notes.push(format!("fitted: {fit}"));
         }
+        reach(&loaded.mesh, self.shape).map_err(SimplifyError::InvalidOutput)?;
         let normal = self.shape.normalisation();
         let mesh = loaded.mesh.transformed(1.0 / normal.diagonal, |p| normal.forward(p));
         // The reader repairs lists, the check refuses what no repair can mean.
         mesh.check()?;
-        for (id, sphere) in mesh.spheres.iter().enumerate() {
-            let reach = sphere.centre.abs().max_element().max(sphere.radius);
-            if reach > LARGEST_SPHERE {
-                return invalid(format!(
-                    "sphere {id} reaches {reach:.1e} diagonals of the surface away from it: write the units of \
-                     {{surface}}"
-                ));
-            }
-        }
         Ok((mesh, loaded.notes))
     }
+}
+
+/// A medial mesh larger than this, in diagonals of the surface, cannot belong to it.
+// Next to its spheres the whole surface is less than a rounding error.
+const LARGEST_SPHERE: f64 = 1e12;
+
+/// How far a medial mesh in the unit of a shape's input reaches from the middle of the surface, in diagonals.
+///
+/// # Errors
+/// In words, which sphere is too far away to be measured.
+pub fn reach(mesh: &MedialMesh, shape: &Shape) -> Result<f64, String> {
+    let to_normal = shape.normalisation();
+    let mut reach = 0.0_f64;
+    for (id, sphere) in mesh.spheres.iter().enumerate() {
+        let centre = to_normal.forward(sphere.centre);
+        // The maximum norm overflows later than the length, and is as good for a bound.
+        let size = centre.abs().max_element().max(sphere.radius / to_normal.diagonal);
+        reach = reach.max(size);
+        // An overflow gives a size that is infinite or not a number.
+        if size.is_nan() || size > LARGEST_SPHERE {
+            return Err(format!(
+                "sphere {id} reaches {size:.1e} diagonals of the surface away from it: the medial mesh is in other \
+                 units, or of another surface"
+            ));
+        }
+    }
+    Ok(reach)
 }
 
 /// The system does not let us do something: that is no fault of the program.
@@ -315,18 +352,23 @@ fn text_like(value: &Value, default: &str) -> Result<String, &'static str> {
     }
 }
 
-/// SHA-256 of a declaration and of every file that a word of its command names.
+/// The files of a plug-in: its program, those that are words of the command, and those that it lists.
+fn files(declaration: &Declaration) -> impl Iterator<Item = PathBuf> {
+    let words = declaration.arguments.iter().filter_map(Word::plain);
+    let words = words.map(|word| declaration.folder.join(word));
+    // A program from PATH is part of the machine, one beside the file is part of the plug-in.
+    let own = declaration.written.first().is_some_and(|program| program.contains('/'));
+    let program = own.then(|| declaration.program.clone());
+    program.into_iter().chain(words).chain(declaration.files.iter().cloned())
+}
+
+/// SHA-256 of a declaration and of its files.
 fn fingerprint(declaration: &Declaration) -> io::Result<String> {
     let Declaration { id, title, citation, levels, native, params, written, fit, .. } = declaration;
     let declared = json!([id, title, citation, levels, native, params, written, fit]);
     let mut hasher = Sha256::new();
     hasher.update(declared.to_string());
-    let words = declaration.arguments.iter().filter_map(Word::plain);
-    let words = words.map(|word| declaration.folder.join(word));
-    // A program from PATH is part of the machine, one beside the file is part of the plug-in.
-    let own = written.first().is_some_and(|program| program.contains('/'));
-    let files = own.then(|| declaration.program.clone()).into_iter().chain(words);
-    for (place, file) in files.enumerate().filter(|(_, file)| file.is_file()) {
+    for (place, file) in files(declaration).enumerate().filter(|(_, file)| file.is_file()) {
         let bytes = fs::read(&file)?;
         // With its place and its length: otherwise bytes could move from one file to the next unnoticed.
         hasher.update(format!("\n{place} {}\n", bytes.len()));
@@ -339,9 +381,6 @@ fn fingerprint(declaration: &Declaration) -> io::Result<String> {
 const UNSUPPORTED: i32 = 65;
 /// Bytes of an output; larger ones are refused unread.
 const LARGEST_OUTPUT: u64 = 1_000_000_000;
-/// A medial mesh larger than this, in diagonals of the surface, cannot belong to it.
-const LARGEST_SPHERE: f64 = 1e12;
-
 /// Most resident bytes of a program and its descendants together, as far as they were looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ProgramPeak(pub u64);

@@ -24,6 +24,7 @@ use std::fs;
 use std::path::Path;
 
 use medial::simplifier::Registered;
+use medial_reports::check_regular;
 
 use crate::provenance::hex_digest;
 
@@ -33,7 +34,7 @@ mod program;
 
 pub use declaration::PluginError;
 pub(crate) use declaration::is_id;
-pub use external::{External, OwnSeconds, ProgramPeak, SCRATCH};
+pub use external::{External, OwnSeconds, ProgramPeak, SCRATCH, reach};
 pub(crate) use program::Drain;
 
 /// Reads and checks a file of plug-ins: its methods, in its order.
@@ -42,8 +43,8 @@ pub(crate) use program::Drain;
 /// When the file cannot be read or is wrong: the error names the line and says what to do. An id that
 /// is among `taken`, those of the methods that there are, is wrong too.
 pub fn load(path: &Path, taken: &[&str]) -> Result<Vec<External>, PluginError> {
-    let text =
-        fs::read_to_string(path).map_err(|why| refused(path, format!("cannot be read: {why}")))?;
+    let text = check_regular(path).and_then(|()| fs::read_to_string(path));
+    let text = text.map_err(|why| refused(path, format!("cannot be read: {why}")))?;
     parse(path, &text, taken)
 }
 
@@ -75,11 +76,6 @@ pub trait ScriptLoader: Send + Sync {
     fn load(&self, path: &Path) -> Result<Vec<Registered>, String>;
 }
 
-/// Whether a plug-in file holds classes of Python rather than declarations of programs.
-pub fn is_script(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension == "py")
-}
-
 /// The methods of a file of classes, and the SHA-256 of that file: an edited class is not taken for the old one.
 ///
 /// # Errors
@@ -94,7 +90,8 @@ pub fn load_script(
                    `medial`; or declare a program that runs them, in a TOML file";
         refused(path, why)
     })?;
-    let bytes = fs::read(path).map_err(|error| refused(path, error))?;
+    let bytes = check_regular(path).and_then(|()| fs::read(path));
+    let bytes = bytes.map_err(|error| refused(path, error))?;
     let methods = loader.load(path).map_err(|why| refused(path, why))?;
     if methods.is_empty() {
         let why = "no class is a method; put @medial_axis.simplifier before one";
@@ -117,10 +114,7 @@ pub fn load_script(
 
 #[cfg(test)]
 mod tests {
-    use medial::shape::Shape;
-    use medial::simplifier::{
-        Method, MethodInfo, NoParams, RunContext, Simplification, SimplifyError,
-    };
+    use medial::simplifier::{MethodInfo, SimplifyError, simple};
 
     use super::*;
 
@@ -129,15 +123,9 @@ mod tests {
 
     impl ScriptLoader for Ids {
         fn load(&self, _: &Path) -> Result<Vec<Registered>, String> {
-            fn prepare<'s>(
-                _: &'s Shape,
-                _: NoParams,
-                _: &RunContext,
-            ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
-                Err(SimplifyError::unsupported("never asked here"))
-            }
             let method = |id: &&'static str| {
-                Registered::from(Method::new(MethodInfo::new(*id, "A class"), prepare))
+                let info = MethodInfo::new(*id, "A class");
+                simple(info, |_, _| Err(SimplifyError::unsupported("never asked here"))).into()
             };
             match self.0 {
                 ["?"] => Err("SyntaxError: line 1".to_owned()),

@@ -19,10 +19,10 @@ use medial::simplifier::{
 };
 use medial::surface::Side;
 use medial::{complex, surface};
-use medial_reports::Target;
+use medial_reports::{Target, check_regular};
 use serde::{Deserialize, Serialize};
 
-use crate::plugin::OwnSeconds;
+use crate::plugin::{OwnSeconds, reach};
 use crate::provenance::{Provenance, hex_digest};
 use crate::study::item::{Item, MethodSpec, SceneSpec};
 use crate::study::{Study, StudyError};
@@ -84,17 +84,14 @@ impl Given {
 }
 
 /// The claims in a folder's `method.toml`. Nothing else about its results is taken from it.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Claims {
     /// Full name of the method.
-    #[serde(skip_serializing_if = "String::is_empty")]
     pub title: String,
     /// Its source.
-    #[serde(skip_serializing_if = "String::is_empty")]
     pub citation: String,
     /// Claimed seconds by the name of the file without its extension.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub seconds: BTreeMap<String, f64>,
 }
 
@@ -120,7 +117,7 @@ impl Given {
     ) -> Result<(Vec<Self>, Claims), String> {
         let failed = |error: io::Error| format!("{}: {error}", folder.display());
         let path = folder.join(CLAIMS);
-        let claims = match fs::read_to_string(&path) {
+        let claims = match check_regular(&path).and_then(|()| fs::read_to_string(&path)) {
             Ok(text) => {
                 toml::from_str(&text).map_err(|why| format!("{}: {why}", path.display()))?
             }
@@ -135,7 +132,8 @@ impl Given {
             let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             let belonging = meshes.iter().filter(|mesh| {
                 stem.strip_prefix(mesh.as_str()).is_some_and(|rest| {
-                    rest.is_empty() || rest.strip_prefix('-').is_some_and(is_number)
+                    rest.is_empty()
+                        || rest.strip_prefix('-').is_some_and(|count| count.parse::<u64>().is_ok())
                 })
             });
             // `box-8` is a mesh of its own where the study has one: the longest name wins.
@@ -155,10 +153,6 @@ impl Given {
         }
         Ok((files, claims))
     }
-}
-
-fn is_number(text: &str) -> bool {
-    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
 medial::parameters! {
@@ -446,33 +440,6 @@ pub enum FitBy {
     Similarity,
     /// The same, if the file does not fit as it is and does so then.
     Auto,
-}
-
-/// A medial mesh larger than this, in diagonals of the surface, cannot belong to it.
-// Next to its spheres the whole surface is less than a rounding error.
-const LARGEST_SPHERE: f64 = 1e12;
-
-/// How far a medial mesh in the unit of a shape's input reaches from the middle of the surface, in diagonals.
-///
-/// # Errors
-/// In words, which sphere is too far away to be measured.
-pub fn reach(mesh: &MedialMesh, shape: &Shape) -> Result<f64, String> {
-    let to_normal = shape.normalisation();
-    let mut reach = 0.0_f64;
-    for (id, sphere) in mesh.spheres.iter().enumerate() {
-        let centre = to_normal.forward(sphere.centre);
-        // The maximum norm overflows later than the length, and is as good for a bound.
-        let size = centre.abs().max_element().max(sphere.radius / to_normal.diagonal);
-        reach = reach.max(size);
-        // An overflow gives a size that is infinite or not a number.
-        if size.is_nan() || size > LARGEST_SPHERE {
-            return Err(format!(
-                "sphere {id} reaches {size:.1e} diagonals of the surface away from it: the medial mesh is in other \
-                 units, or of another surface"
-            ));
-        }
-    }
-    Ok(reach)
 }
 
 /// Why a file gives no medial mesh for a surface, in words that name it.

@@ -27,6 +27,8 @@ pub struct Registry {
     files: Vec<PathBuf>,
     /// What loads plug-in files that are no declarations.
     loader: Option<Box<dyn ScriptLoader>>,
+    /// Remarks on plug-ins, for the user.
+    pub remarks: Vec<String>,
 }
 
 /// A method, its presentation, and for a plug-in a hash of its files.
@@ -122,7 +124,8 @@ impl Registry {
         initial.version = medial_methods::version(INITIAL);
         let given = Entry::new(crate::study::external::method().into(), None);
         let (entries, others) = (Vec::new(), vec![initial, given]);
-        let mut registry = Self { entries, others, files: Vec::new(), loader: None };
+        let (files, remarks) = (Vec::new(), Vec::new());
+        let mut registry = Self { entries, others, files, loader: None, remarks };
         for registered in methods {
             let id = &registered.method.info().id;
             if registry.entry(id).is_some() {
@@ -149,13 +152,15 @@ impl Registry {
         if self.files.contains(&file) {
             return Ok(());
         }
-        let taken: Vec<&str> = self.entries.iter().map(Entry::id).collect();
-        let new: Vec<Entry> = if plugin::is_script(&file) {
+        // Those of the pseudo-methods, too.
+        let taken: Vec<&str> = self.entries.iter().chain(&self.others).map(Entry::id).collect();
+        let new: Vec<Entry> = if file.extension().is_some_and(|end| end == "py") {
             let (methods, hash) = plugin::load_script(&file, self.loader.as_deref(), &taken)?;
             methods.into_iter().map(|method| Entry::new(method, Some(hash.clone()))).collect()
         } else {
             (plugin::load(&file, &taken)?.into_iter())
                 .map(|external| {
+                    self.remarks.extend(external.remark());
                     let fingerprint = Some(external.fingerprint().to_owned());
                     Entry::new(external.into(), fingerprint)
                 })

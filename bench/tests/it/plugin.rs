@@ -340,6 +340,18 @@ fn a_changed_script_or_declaration_has_another_fingerprint() {
     fs::write(&path, toml.replace("title = \"X\"", "title = \"Y\"")).expect("written");
     let third = fingerprint();
     assert!(first != second && second != third && first != third);
+    // Files inside of words count where the declaration lists them, and are remarked on where it does not.
+    let inside = toml.replace("\"run.sh\"", "\"-c\", \"./run.sh; x=run.sh\"");
+    let listed = format!("{inside}files = [\"run.sh\"]\n");
+    let of = |toml: &str| {
+        fs::write(&path, toml).expect("written");
+        let method = plugin::load(&path, &[]).expect("a plug-in").remove(0);
+        (method.fingerprint().to_owned(), method.remark())
+    };
+    let before = [of(&inside), of(&listed)];
+    fs::write(folder.path().join("run.sh"), VALID).expect("written");
+    assert!(of(&inside) == before[0] && of(&listed).0 != before[1].0 && before[1].1.is_none());
+    assert!(before[0].1.as_ref().is_some_and(|remark| remark.contains("./run.sh, run.sh")));
     // The same files in another folder are the same plug-in.
     let (_elsewhere, path) = written(&toml, &[("run.sh", VALID)]);
     assert_eq!(plugin::load(&path, &[]).expect("a plug-in")[0].fingerprint(), first);
@@ -378,6 +390,8 @@ fn wrong_declarations_are_refused_with_their_line() {
         (entry(good, r#"["spheres", "native"]"#, ""), 5, "describe it"),
         (entry(good, r#"["balls"]"#, ""), 5, "unknown variant `balls`"),
         (command(good).replace("\"x\"", "\"My X\""), 2, "the id \"My X\""),
+        (command(good).replace("\"x\"", "\"-\""), 2, "the id \"-\""),
+        (more("files = [\"none\"]"), 6, "no regular file"),
         (command(good) + &command(good), 8, "a method above is called `x`"),
         ("[[method]]\nid = \"x\"\n".to_owned(), 1, "missing field"),
     ];

@@ -49,9 +49,11 @@ fn programs() {
 #[test]
 fn an_id_that_is_taken_is_refused() {
     let at = folder();
-    let text = "[[method]]\nid = \"qmat\"\ntitle = \"Mine\"\nlevels = [\"spheres\"]\n\
+    let text = "[[method]]\nid = \"ID\"\ntitle = \"Mine\"\nlevels = [\"spheres\"]\n\
                 command = [\"sh\", \"{output}\", \"{spheres}\"]\n";
-    fs::write(at("mine.toml"), text).expect("written");
-    let why = "mine.toml, line 2: there is a method called `qmat` already";
-    refused(&["methods", "--plugins", &at("mine.toml")], 2, why);
+    for id in ["qmat", "initial", "given"] {
+        fs::write(at("mine.toml"), text.replace("ID", id)).expect("written");
+        let why = format!("mine.toml, line 2: there is a method called `{id}` already");
+        refused(&["methods", "--plugins", &at("mine.toml")], 2, &why);
+    }
 }
