@@ -13,10 +13,7 @@ use crate::exit::Failure;
 use crate::progress::Verbosity;
 use crate::study::item::Dual;
 use crate::study::registry::{Entry, Registry};
-use crate::study::{MOST_SAMPLES, Study};
-
-/// More threads than this serve nobody and can exhaust the system.
-const MOST_THREADS: u64 = 1024;
+use crate::study::{MOST_SAMPLES, MOST_THREADS, Study};
 
 /// Options of every verb.
 #[derive(Clone, Debug, Args)]
@@ -30,7 +27,7 @@ pub struct Global {
         long,
         global = true,
         value_name = "N",
-        value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_THREADS)
+        value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_THREADS as u64)
     )]
     pub threads: Option<usize>,
     /// No progress on standard error.

@@ -24,8 +24,14 @@ pub fn install() {
     });
 }
 
-/// From now on an interrupt only sets the flag, which is given.
+/// From now on an interrupt only sets the flag, which is given, until [`stop_listening`].
 pub fn listen() -> &'static AtomicBool {
     LISTENING.store(true, Ordering::Relaxed);
     &INTERRUPTED
+}
+
+/// From now on an interrupt ends the process at once again. Returns whether one came before.
+pub fn stop_listening() -> bool {
+    LISTENING.store(false, Ordering::Relaxed);
+    INTERRUPTED.load(Ordering::Relaxed)
 }

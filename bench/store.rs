@@ -5,14 +5,12 @@
 //! ends.
 
 use std::collections::HashMap;
-use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{BufRead, BufReader, Read, Seek, Write};
+use std::fs::{DirEntry, File, OpenOptions, TryLockError};
+use std::io::{Read, Seek, Write};
 use std::path::{Component, Path, PathBuf};
 use std::{fs, io};
 
-use medial_reports::{Journal, JournalError, Record, Status, Target, read_records};
-use serde::Deserialize;
-use serde::de::IgnoredAny;
+use medial_reports::{Journal, JournalError, Record, Status, Target, check_regular, parse_records};
 
 use crate::study::item::Item;
 
@@ -24,6 +22,12 @@ pub const AXES: &str = "axes";
 pub const PAGE: &str = "index.html";
 /// Name of the file that names the process that holds a store.
 const LOCK: &str = ".lock";
+/// What the text of this file begins with.
+const HOLDER: &str = "process ";
+/// Names in the folder itself that are written or removed.
+const FILES: [&str; 6] = [LOCK, RESULTS, PAGE, "header.json", "study.toml", "results.csv"];
+/// Names of folders in it that are this program's.
+const FOLDERS: [&str; 5] = [AXES, "pictures", "plots", "tables", "views"];
 
 /// A folder of results that this process may add to.
 pub struct Store {
@@ -31,29 +35,12 @@ pub struct Store {
     /// Held as long as the store is open.
     _lock: File,
     journal: Journal,
-    known: HashMap<String, Known>,
+    /// The last record of each key.
+    known: HashMap<String, Record>,
     /// Number of records that this process has added.
     pub added: usize,
     /// Remarks about the folder as it was found.
     pub remarks: Vec<String>,
-}
-
-/// The facts of a record that decide whether its level has to be run again.
-#[derive(Deserialize)]
-struct Known {
-    #[serde(default)]
-    key: String,
-    status: Status,
-    #[serde(default)]
-    repetitions: Vec<IgnoredAny>,
-    conditions: Option<KnownLimits>,
-}
-
-#[derive(Clone, Copy, Default, Deserialize)]
-#[serde(default)]
-struct KnownLimits {
-    seconds_limit: f64,
-    bytes_limit: u64,
 }
 
 /// Why a folder cannot be used as a store.
@@ -79,35 +66,23 @@ fn wrong(path: &Path, why: impl ToString) -> StoreError {
 impl Store {
     /// Opens or makes a folder of results, for `journal`, one of its lists of records.
     ///
-    /// The remains of an interrupted process are removed, with a remark: temporary files, and an
-    /// incomplete last line.
+    /// The remains of an interrupted process are removed: temporary files, and with a remark an incomplete last line.
     ///
     /// # Errors
-    /// When it is no folder, is not writable, or another process holds it.
+    /// When it is no folder, has other files or a link where results are written, is not writable, or another process
+    /// holds it.
     pub fn open(dir: &Path, journal: &str, command: &str) -> Result<Self, StoreError> {
-        if dir.exists() && !dir.is_dir() {
-            return Err(wrong(dir, "not a folder"));
-        }
+        let entries = entries_of(dir);
+        claim(dir, is_store(dir, journal), &entries)?;
         fs::create_dir_all(dir).map_err(io_error(dir))?;
-        // A lock or a study is left by a run that ended before its first record.
-        let is_store = [LOCK, journal, "study.toml"].iter().any(|name| dir.join(name).exists());
-        if !is_store && fs::read_dir(dir).map_err(io_error(dir))?.next().is_some() {
-            let why = "neither empty nor a folder of results; take another with --out";
-            return Err(wrong(dir, why));
-        }
         // Before anything is repaired: another process may be in the middle of a line.
         let lock = lock(dir, command)?;
         let path = dir.join(journal);
-        let (known, was_torn) = read_known(&path).map_err(io_error(&path))?;
-        let mut remarks = Vec::new();
-        if was_torn {
-            remarks.push(format!(
-                "{}: its last line was incomplete, the trace of a process that was ended while it \
-                 wrote; it was removed, and its item is run again",
-                path.display()
-            ));
+        let (known, remarks) = read_known(&path).map_err(io_error(&path))?;
+        // The remains of an ended process. The lock is held, so none is in use.
+        for entry in entries.iter().filter(|entry| is_temporary(entry)) {
+            let _ = fs::remove_file(entry.path());
         }
-        remove_temporaries(dir);
         let journal = Journal::open(&path)?;
         Ok(Self { dir: dir.to_owned(), _lock: lock, journal, known, added: 0, remarks })
     }
@@ -123,8 +98,14 @@ impl Store {
     /// # Errors
     /// When a file cannot be removed.
     pub fn clear(&mut self, journal: &str) -> Result<(), StoreError> {
-        remove_artifacts(&self.dir, &self.dir.join(journal));
-        for name in [PAGE, journal, "header.json", "study.toml", "results.csv"] {
+        let artifacts = self.known.values().filter_map(|record| record.artifact.as_deref());
+        for path in artifacts.filter_map(|artifact| artifact_path(&self.dir, artifact)) {
+            // A file that stays does not count as a result, without a record.
+            let _ = fs::remove_file(&path);
+            // Succeeds for a folder that is empty now.
+            let _ = path.parent().map(fs::remove_dir);
+        }
+        for name in FILES.iter().filter(|&&name| name != LOCK) {
             remove(&self.dir.join(name))?;
         }
         // The journal is gone: a stale state would skip what has to be run.
@@ -133,16 +114,24 @@ impl Store {
         Ok(())
     }
 
-    /// The levels of an item that have to be run: levels without a record, levels that were ended by a
-    /// limit that is larger now, and failed levels if these are to be retried.
+    /// The levels of an item that have to be run: levels without a record or whose medial mesh is gone, levels that were
+    /// ended by a limit that is larger now, and failed levels if these are to be retried.
     pub fn missing(&self, item: &Item, retry_failed: bool) -> Vec<Target> {
         (item.levels.iter().zip(item.keys()))
             .filter(|(_, key)| {
                 let known = self.known.get(key);
-                known.is_none_or(|known| known.is_incomplete(item, retry_failed))
+                known.is_none_or(|record| {
+                    self.lacks_mesh(record) || is_incomplete(record, item, retry_failed)
+                })
             })
             .map(|(&level, _)| level)
             .collect()
+    }
+
+    /// Whether the medial mesh that a record names is gone. Some records name none.
+    fn lacks_mesh(&self, record: &Record) -> bool {
+        let is_there = |name| artifact_path(&self.dir, name).is_some_and(|path| path.is_file());
+        record.artifact.as_deref().is_some_and(|name| !is_there(name))
     }
 
     /// Adds records.
@@ -157,19 +146,82 @@ impl Store {
     }
 }
 
-impl Known {
-    fn is_incomplete(&self, item: &Item, retry_failed: bool) -> bool {
-        let limits = self.conditions.unwrap_or_default();
-        match self.status {
-            // A result that came in time is the same under any limit; one that did not may come under a larger one.
-            Status::TimedOut if item.limits.seconds > limits.seconds_limit => true,
-            Status::OutOfMemory if item.limits.bytes > limits.bytes_limit => true,
-            status if status.is_failure() => retry_failed,
-            // A file is not timed.
-            Status::External => false,
-            status => status.has_result() && self.repetitions.len() < item.repeat,
+/// Whether the level of a record has to be run again.
+fn is_incomplete(record: &Record, item: &Item, retry_failed: bool) -> bool {
+    let limits = record.conditions.clone().unwrap_or_default();
+    match record.status {
+        // A result that came in time is the same under any limit; one that did not may come under a larger one.
+        Status::TimedOut if item.limits.seconds > limits.seconds_limit => true,
+        Status::OutOfMemory if item.limits.bytes > limits.bytes_limit => true,
+        status if status.is_failure() => retry_failed,
+        // A file is not timed.
+        Status::External => false,
+        status => status.has_result() && record.repetitions.len() < item.repeat,
+    }
+}
+
+/// Whether a folder has a list of records, or the lock of a run that ended before its first one.
+pub fn is_store(dir: &Path, journal: &str) -> bool {
+    let lock = dir.join(LOCK);
+    let holder = check_regular(&lock).and_then(|()| fs::read_to_string(lock));
+    // Another process creates it, and then writes into it.
+    let is_new = |text: &str| text.is_empty() && listed(dir).count() == 1;
+    let is_ours = holder.is_ok_and(|text| text.starts_with(HOLDER) || is_new(&text));
+    is_ours || dir.join(journal).exists()
+}
+
+/// Refuses a folder that is not this program's and not empty, and one in which a link or a device stands at one of the
+/// `entries` where this program writes or removes. The folder itself may be a link.
+///
+/// # Errors
+/// [`StoreError::File`], which names what is there.
+pub fn claim(dir: &Path, is_ours: bool, entries: &[DirEntry]) -> Result<(), StoreError> {
+    if dir.exists() && !dir.is_dir() {
+        return Err(wrong(dir, "not a folder"));
+    }
+    // Requests to workers are JSON, which has no other text.
+    if dir.to_str().is_none() {
+        return Err(wrong(dir, "the name is not UTF-8; take another with --out"));
+    }
+    if !is_ours && listed(dir).next().is_some() {
+        let why = "neither empty nor a folder of results; take another with --out";
+        return Err(wrong(dir, why));
+    }
+    for entry in entries {
+        let kind = entry.file_type().map_err(io_error(&entry.path()))?;
+        if !kind.is_file() && !kind.is_dir() {
+            let why = "a link or not a regular file, where results are written; remove it, or take \
+                       another folder with --out";
+            return Err(wrong(&entry.path(), why));
         }
     }
+    Ok(())
+}
+
+/// What a folder holds; nothing where it cannot be listed.
+pub fn listed(dir: impl AsRef<Path>) -> impl Iterator<Item = DirEntry> {
+    fs::read_dir(dir).into_iter().flatten().flatten()
+}
+
+/// The entries of a store that are this program's, by their names or by the folders that they lie in; what else the
+/// folder holds belongs to the user. The folders come before their contents.
+fn entries_of(dir: &Path) -> Vec<DirEntry> {
+    let is_named = |entry: &DirEntry| {
+        let name = entry.file_name();
+        FILES.iter().chain(&FOLDERS).any(|own| *own == name) || is_temporary(entry)
+    };
+    let mut entries: Vec<DirEntry> = listed(dir).filter(is_named).collect();
+    entries.extend(FOLDERS.iter().flat_map(|folder| listed(dir.join(folder))));
+    let meshes = listed(dir.join(AXES)).filter(|mesh| mesh.file_type().is_ok_and(|t| t.is_dir()));
+    entries.extend(meshes.flat_map(|mesh| listed(mesh.path())));
+    entries
+}
+
+/// Whether this program left it behind in the middle of a write.
+fn is_temporary(entry: &DirEntry) -> bool {
+    let name = entry.file_name();
+    let name = name.to_string_lossy();
+    name.starts_with(".medial-") && name.ends_with(".tmp")
 }
 
 /// Takes the lock and writes down who holds it.
@@ -184,10 +236,7 @@ fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
             // Written by the other process after it took the lock: it may be empty for a moment.
             let mut holder = String::new();
             let _ = file.read_to_string(&mut holder);
-            let holder = match holder.trim() {
-                "" => "another process".to_owned(),
-                holder => holder.to_owned(),
-            };
+            let holder = if holder.is_empty() { "another process" } else { &holder };
             let why = "is adding results to this folder; wait for it, or take another with --out";
             return Err(wrong(dir, format!("{holder} {why}")));
         }
@@ -196,7 +245,7 @@ fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
         Err(TryLockError::Error(error)) => return Err(io_error(&path)(error)),
     }
     // For the message alone: the lock itself is the system's, and ends with the process.
-    let holder = format!("process {} (`{command}`)", std::process::id());
+    let holder = format!("{HOLDER}{} (`{command}`)", std::process::id());
     let written = file
         .set_len(0)
         .and_then(|()| file.rewind())
@@ -205,72 +254,48 @@ fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
     Ok(file)
 }
 
-/// The state of each key, from its last line, and whether the last line was incomplete. It is cut off then.
-fn read_known(path: &Path) -> io::Result<(HashMap<String, Known>, bool)> {
-    let file = match OpenOptions::new().read(true).append(true).open(path) {
+/// The last record of each key, and remarks on lines that hold no record: an incomplete last line is cut off, others stay
+/// and do not count.
+fn read_known(path: &Path) -> io::Result<(HashMap<String, Record>, Vec<String>)> {
+    let bytes = match check_regular(path).and_then(|()| fs::read(path)) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Default::default()),
-        file => file?,
+        bytes => bytes?,
     };
-    let (mut known, mut line, mut whole) = (HashMap::new(), Vec::new(), 0);
-    let mut lines = BufReader::new(&file);
-    // Line by line: millions of records need not fit into memory for their states.
-    while lines.read_until(b'\n', &mut line)? > 0 {
-        if !line.ends_with(b"\n") {
-            if serde_json::from_slice::<IgnoredAny>(&line).is_err() {
-                file.set_len(whole)?;
-                return Ok((known, true));
-            }
-            // A complete record that only lacks its line break is kept.
-            (&file).write_all(b"\n")?;
-        }
-        whole += line.len() as u64;
-        if let Ok(record) = serde_json::from_slice::<Known>(&line)
-            && !record.key.is_empty()
-        {
-            // Lines are only added: the last one of a key replaces the earlier.
-            known.insert(record.key.clone(), record);
-        }
-        line.clear();
+    let (name, mut remarks) = (path.display(), Vec::new());
+    let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
+    let is_torn = parse_records(&bytes[whole..]).bad_lines.iter().any(|line| line.torn);
+    if is_torn {
+        OpenOptions::new().write(true).open(path)?.set_len(whole as u64)?;
+        remarks.push(format!(
+            "{name}: its last line was incomplete, the trace of a process that was ended while it wrote; it was removed, \
+             and its item is run again"
+        ));
     }
-    Ok((known, false))
+    let journaled = parse_records(if is_torn { &bytes[..whole] } else { &bytes });
+    if let Some(first) = journaled.bad_lines.first() {
+        let count = journaled.bad_lines.len();
+        remarks.push(format!(
+            "{name}: lines without a record, whose items run again: {count}; {first}"
+        ));
+    }
+    // Lines are only added: the last one of a key replaces the earlier.
+    let known = journaled.records.into_iter().map(|record| (record.key.clone(), record));
+    Ok((known.collect(), remarks))
 }
 
-/// Whether a path of a record stays in its store.
-pub fn is_inside(path: &str) -> bool {
-    Path::new(path).components().all(|part| matches!(part, Component::Normal(_)))
-}
-
-/// Removes the medial meshes that records name.
-// A file that cannot be removed stays: without a record it does not count as a result.
-fn remove_artifacts(dir: &Path, journal: &Path) {
-    let Ok(journaled) = read_records(journal) else { return };
-    for artifact in journaled.records.iter().filter_map(|record| record.artifact.as_deref()) {
-        // A journal from elsewhere must not name files outside of its folder for removal.
-        if is_inside(artifact) && artifact.ends_with(".ma") {
-            let path = dir.join(artifact);
-            let _ = fs::remove_file(&path);
-            // Succeeds for a folder that is empty now.
-            let _ = path.parent().map(fs::remove_dir);
+/// The file of a medial mesh that a record names, below the folder of a store; `None` for a path that leads elsewhere.
+// Records can come from elsewhere: they must not name other files for reading, writing or removal.
+pub fn artifact_path(dir: &Path, artifact: &str) -> Option<PathBuf> {
+    let named = Path::new(artifact);
+    let is_own = named.starts_with(AXES) && named.extension().is_some_and(|end| end == "ma");
+    let mut path = dir.to_owned();
+    for part in named.components() {
+        path.push(part);
+        if !is_own || !matches!(part, Component::Normal(_)) || path.is_symlink() {
+            return None;
         }
     }
-}
-
-/// Removes temporary files that this program left behind, only in the folders that it writes to.
-// The lock is held, so none is in use.
-fn remove_temporaries(dir: &Path) {
-    let mut folders = vec![dir.to_owned(), dir.join("tables"), dir.join("plots")];
-    // Never the folder's other contents: these belong to the user.
-    folders.push(dir.join(AXES));
-    let meshes = fs::read_dir(dir.join(AXES)).into_iter().flatten().flatten();
-    folders.extend(meshes.map(|entry| entry.path()).filter(|path| path.is_dir()));
-    let entries = folders.iter().flat_map(fs::read_dir).flatten().flatten();
-    for entry in entries {
-        let name = entry.file_name();
-        let name = name.to_string_lossy();
-        if name.starts_with(".medial-") && name.ends_with(".tmp") {
-            let _ = fs::remove_file(entry.path());
-        }
-    }
+    Some(path)
 }
 
 fn remove(path: &Path) -> Result<(), StoreError> {

@@ -113,16 +113,16 @@ pub fn run(
     for file in &study.plugins {
         registry.add_plugins(&study.resolved(file)).map_err(Failure::usage)?;
     }
+    registry.remarks.iter().for_each(|remark| note(global, remark));
     arguments.apply_to_methods(&mut study, registry)?;
     let provenance = Provenance::here();
     let mut items = study.items(registry, &provenance)?;
     if let Some(text) = &arguments.shard {
         items = shard(text, &items)?;
     }
-    let interrupted = interrupt::listen();
     let axes = Some(arguments.out.join(AXES));
-    let supervisor = Supervisor::new(registry.files(), &provenance, axes, interrupted);
     let store = Store::open(&arguments.out, RESULTS, &provenance.command)?;
+    let supervisor = Supervisor::new(registry.files(), &provenance, axes, interrupt::listen());
     store.remarks.iter().for_each(|remark| note(global, remark));
     let mut side = Contender { build: None, supervisor, store };
     let (left, found) = match arguments.fresh {
@@ -142,7 +142,8 @@ pub fn run(
     }
     let ended = run_items(&left, std::slice::from_mut(&mut side), global.progress());
     let run = side.store.added;
-    if matches!(ended, Err(RunError::Interrupted)) {
+    // Nothing looks at the flag from here on.
+    if interrupt::stop_listening() || matches!(ended, Err(RunError::Interrupted)) {
         let levels: usize = left.iter().map(|item| item.levels.len()).sum();
         print_error(&format!(
             "interrupted: {run} of {levels} results were made and are kept; the same command goes on from there"

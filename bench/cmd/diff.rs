@@ -18,7 +18,7 @@ use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_raw};
 use crate::provenance::Provenance;
 use crate::rebuild::records;
-use crate::store::{AXES, RESULTS, Store};
+use crate::store::{AXES, RESULTS, Store, claim, is_store, listed};
 use crate::study::Study;
 use crate::study::item::Item;
 use crate::study::registry::Registry;
@@ -126,13 +126,18 @@ fn alternate(
     for file in &study.plugins {
         registry.add_plugins(&study.resolved(file)).map_err(Failure::usage)?;
     }
+    registry.remarks.iter().for_each(|remark| note(global, remark));
     let here = Provenance::here();
     let items = study.items(registry, &here)?;
+    let folders = ["old", "new"].map(|side| arguments.out.join(side));
+    let entries: Vec<_> = listed(&arguments.out).collect();
+    claim(&arguments.out, is_store(&folders[0], RESULTS), &entries)?;
+    // Before the process listens: a program that is none of ours may never end.
+    let builds = [&arguments.old, &arguments.new].map(|program| Build::of(program));
     let interrupted = interrupt::listen();
     let mut sides = Vec::new();
-    for (program, side) in [(&arguments.old, "old"), (&arguments.new, "new")] {
-        let build = Build::of(program).map_err(Failure::input)?;
-        let folder = arguments.out.join(side);
+    for (build, folder) in builds.into_iter().zip(folders) {
+        let build = build.map_err(Failure::input)?;
         let store = Store::open(&folder, RESULTS, &here.command)?;
         store.remarks.iter().for_each(|remark| note(global, remark));
         let axes = Some(folder.join(AXES));
@@ -145,15 +150,12 @@ fn alternate(
     left.retain(|item| {
         sides.iter().any(|side| !side.store.missing(&side.own(item), false).is_empty())
     });
-    match run_items(&left, &mut sides, global.progress()) {
-        Err(RunError::Interrupted) => {
-            print_error(
-                "interrupted: what was finished is kept; the same command goes on from there",
-            );
-            return Ok(None);
-        }
-        ended => ended?,
+    let ended = run_items(&left, &mut sides, global.progress());
+    if interrupt::stop_listening() || matches!(ended, Err(RunError::Interrupted)) {
+        print_error("interrupted: what was finished is kept; the same command goes on from there");
+        return Ok(None);
     }
+    ended?;
     let [old, new] = [&sides[0], &sides[1]].map(|side| requested_records(side, &items, global));
     Ok(Some([old?, new?]))
 }

@@ -16,7 +16,7 @@ use crate::files;
 use crate::output::{print_json, print_line};
 use crate::provenance::Provenance;
 use crate::rebuild::{Rebuilt, STUDY, rebuild, records, write_study};
-use crate::store::{PAGE, RESULTS, Store, is_inside};
+use crate::store::{PAGE, RESULTS, Store, artifact_path};
 use crate::study::Study;
 use crate::study::registry::Registry;
 
@@ -118,11 +118,14 @@ fn merge(dirs: &[PathBuf], out: &Path, registry: &Registry) -> Result<Vec<String
     // After all stores were read: a wrong folder must not leave an empty store behind.
     let store = Store::open(out, RESULTS, "medial report")?;
     for (record, dir, _) in merged.iter().filter(|(_, dir, _)| dir.as_path() != out) {
-        let Some(artifact) = record.artifact.as_deref().filter(|path| is_inside(path)) else {
+        let Some(artifact) = record.artifact.as_deref() else { continue };
+        // Names hold the key, so that two stores cannot mean different results by one name.
+        let [from, to] = [dir.as_path(), out].map(|store| artifact_path(store, artifact));
+        let (Some(from), Some(to)) = (from.filter(|path| path.is_file()), to) else {
+            let dir = dir.display();
+            notes.push(format!("{dir}: {artifact}: no medial mesh of this folder; left out"));
             continue;
         };
-        // Names hold the key, so that two stores cannot mean different results by one name.
-        let (from, to) = (dir.join(artifact), out.join(artifact));
         let bytes = fs::read(&from).map_err(|error| Failure::at(&from, error))?;
         fs::create_dir_all(to.parent().unwrap_or(out)).map_err(|error| Failure::at(&to, error))?;
         files::write(&to, &bytes)?;

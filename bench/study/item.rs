@@ -186,13 +186,6 @@ impl Measure {
     }
 }
 
-impl From<JudgeOptions> for Measure {
-    fn from(options: JudgeOptions) -> Self {
-        let JudgeOptions { samples, volume_depth, seed } = options;
-        Self { samples, volume_depth, seed, certify: None }
-    }
-}
-
 impl fmt::Display for Dual {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
@@ -233,7 +226,7 @@ mod tests {
                 noise: None,
                 sampling: Sampling::default(),
                 dual: Dual::Fan,
-                measure: JudgeOptions::default().into(),
+                measure: Measure { samples: 100, volume_depth: 5, seed: 0, certify: None },
             },
             method: MethodSpec {
                 id: "qmat".into(),

@@ -26,26 +26,9 @@ pub enum PublicError {
         /// What is wrong.
         why: String,
     },
-    /// Nothing has this name.
-    #[error(
-        "no set, package or mesh is called `{word}`{meant}; `medial datasets list` names them all"
-    )]
-    Unknown {
-        /// The requested name.
-        word: String,
-        /// A known name that is like it.
-        meant: String,
-    },
-    /// Meshes are not in the folder.
-    #[error("{word}: not here: {names}; {how}")]
-    Missing {
-        /// The requested name.
-        word: String,
-        /// The meshes that are missing.
-        names: String,
-        /// The command that gets them.
-        how: String,
-    },
+    /// Nothing has the requested name, or not all of its meshes are in the folder; what to do.
+    #[error("{0}")]
+    Name(String),
 }
 
 /// An error message lists at most this many names.
@@ -142,7 +125,7 @@ impl Library {
     /// The meshes of the catalogue that a word stands for: a set, a package, or the name of one.
     ///
     /// # Errors
-    /// [`PublicError::Unknown`].
+    /// [`PublicError::Name`].
     pub fn wanted(&self, word: &str) -> Result<Vec<&Published>, PublicError> {
         let set = Set::ALL.into_iter().find(|set| set.key() == word);
         let mut wanted: Vec<_> = self.catalogue.meshes.iter().collect();
@@ -191,7 +174,7 @@ impl Library {
             names.truncate(MOST_NAMES);
             names.push(format!("{more} more"));
         }
-        Err(PublicError::Missing { word: word.to_owned(), names: names.join(", "), how })
+        Err(PublicError::Name(format!("{word}: not here: {}; {how}", names.join(", "))))
     }
 
     /// The one input that a name stands for.
@@ -212,6 +195,8 @@ impl Library {
         let packages = self.catalogue.packages.iter().map(|package| package.id.as_str());
         let sets = Set::ALL.map(Set::key).into_iter().chain(["builtin"]);
         let meant = did_you_mean(word, sets.chain(packages).chain(meshes));
-        PublicError::Unknown { word: word.to_owned(), meant }
+        PublicError::Name(format!(
+            "no set, package or mesh is called `{word}`{meant}; `medial datasets list` names them all"
+        ))
     }
 }

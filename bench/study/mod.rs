@@ -19,8 +19,8 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use medial::simplifier::Params;
-use medial::surface::Sampling;
-use medial_reports::Target;
+use medial::surface::{self, Sampling};
+use medial_reports::{Target, check_regular};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::provenance::{Provenance, hex_digest};
@@ -38,6 +38,9 @@ const MOST_REPEATS: usize = 10_000;
 
 /// More surface samples than this are taken for a slip.
 pub const MOST_SAMPLES: usize = 10_000_000;
+
+/// More threads than this serve nobody and can exhaust the system.
+pub const MOST_THREADS: usize = 1024;
 
 /// Surface samples of a comparison unless told otherwise.
 // Fewer than `evaluate` takes, since it measures hundreds of results.
@@ -176,7 +179,8 @@ impl Study {
     /// [`StudyError::File`], with the line where the text is at fault.
     pub fn read(path: &Path) -> Result<Self, StudyError> {
         let failed = |message: String| StudyError::File { path: path.to_owned(), message };
-        let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
+        let text = check_regular(path).and_then(|()| std::fs::read_to_string(path));
+        let text = text.map_err(|error| failed(error.to_string()))?;
         let mut study: Self = toml::from_str(&text).map_err(|error| failed(error.to_string()))?;
         let own = path.parent().filter(|own| !own.as_os_str().is_empty());
         // `study.toml` alone has an empty parent, of which there is no absolute path.
@@ -209,12 +213,18 @@ impl Study {
     /// [`StudyError::Value`] for the first of them.
     pub fn check(&self) -> Result<(), StudyError> {
         let counts = self.methods.iter().filter_map(|method| method.spheres.as_ref());
+        let mut paths = (self.meshes.iter().chain(&self.plugins).chain(&self.folder))
+            .chain(self.given.iter().map(|given| &given.file));
         let fault = if !(1..=MOST_REPEATS).contains(&self.repeat) {
             format!("--repeat {}: time each item 1 to {MOST_REPEATS} times", self.repeat)
         } else if !(1..=MOST_SAMPLES).contains(&self.samples) {
             format!("--samples {}: ask for 1 to {MOST_SAMPLES} samples", self.samples)
         } else if !(self.timeout > 0.0 && self.timeout.is_finite()) {
             format!("--timeout {}: a positive number of seconds", self.timeout)
+        } else if let Some(threads) = self.threads.filter(|n| !(1..=MOST_THREADS).contains(n)) {
+            format!("--threads {threads}: a number from 1 to {MOST_THREADS}")
+        } else if let Some(path) = paths.find(|path| path.to_str().is_none()) {
+            format!("{}: the name is not UTF-8; rename it", path.display())
         } else if let Some(width) = self.certify.filter(|width| !(1e-6..1.0).contains(width)) {
             format!("--certify {width}: a fraction of the diagonal from 1e-6 on")
         } else if self.memory == Some(0) {
@@ -363,7 +373,7 @@ impl Study {
         for (source, mesh) in sources.iter().zip(names) {
             // Not by loading it: a refused file is a row of the results, not an error of the study.
             let hash = match source.path() {
-                Some(path) => hash_of(path)?,
+                Some(path) => hex_digest(&surface::content(path).map_err(InputError::from)?),
                 None => Input::load(source)?.hash,
             };
             let scene = SceneSpec {
@@ -496,12 +506,6 @@ pub fn shard(text: &str, items: &[Item]) -> Result<Vec<Item>, StudyError> {
         }
     }
     Ok(own)
-}
-
-pub(crate) fn hash_of(path: &Path) -> Result<String, StudyError> {
-    let read = std::fs::read(path);
-    let bytes = read.map_err(|error| InputError::Read { path: path.to_owned(), error })?;
-    Ok(hex_digest(&bytes))
 }
 
 /// Names that differ in case alone are one file on some systems.

@@ -62,4 +62,6 @@ fn two_builds_take_turns() {
     assert_eq!(run(&arguments), first);
     let foreign = [&["diff", "--run", "/bin/echo", MEDIAL], &options[..]].concat();
     refused(&foreign, 1, "no build of this program");
+    let here = ["diff", "--run", MEDIAL, MEDIAL, "--study", &study, "--out", &at(".")];
+    refused(&here, 1, "neither empty nor a folder of results");
 }

@@ -234,6 +234,7 @@ fn a_study_is_a_file_and_lies_beside_its_results() {
         ("spheres = [3]\nsphere = [4]\n", "line 2"),
         ("spheres = [-3]\n", "line 1"),
         ("timeout = 0\n", "--timeout 0"),
+        ("threads = 0\n", "--threads 0"),
         ("[[method]]\nid = \"qmad\"\n", "did you mean `qmat`"),
         ("[[method]]\nname = \"x\"\n", "id"),
         ("meshes = [\"nowhere.off\"]\n", "nowhere.off"),
@@ -296,6 +297,7 @@ fn a_study_in_a_folder_with_any_name_is_read_back() {
     };
     // A name without a folder stands for the working folder.
     assert_eq!(compare(Path::new("study.toml"), &folder), (1, 0));
+    assert!(fs::read_dir(folder.join("out/pictures")).is_ok_and(|drawn| drawn.count() > 0));
     let kept = folder.join("out/study.toml");
     let named = fs::read_to_string(&kept).expect("a copy");
     let named: toml::Table = named.parse().expect("TOML");
@@ -308,10 +310,84 @@ fn a_study_in_a_folder_with_any_name_is_read_back() {
 #[test]
 fn a_folder_of_other_files_is_refused() {
     let dir = tempfile::tempdir().expect("a folder");
-    fs::write(dir.path().join("thesis.tex"), "").expect("written");
     let words = ["compare", "builtin:box:8", "--methods", "qmat", "--out", text(dir.path())];
-    refused(&words, 1, "neither empty nor a folder of results");
-    assert_eq!(fs::read_dir(dir.path()).expect("a folder").count(), 1, "nothing was written");
+    for name in ["index.html", "study.toml", ".lock"] {
+        fs::write(dir.path().join(name), "mine").expect("written");
+        refused(&words, 1, "neither empty nor a folder of results");
+        assert_eq!(fs::read_dir(dir.path()).expect("a folder").count(), 1, "nothing was written");
+        fs::remove_file(dir.path().join(name)).expect("it is there");
+    }
+}
+
+#[test]
+fn results_that_are_damaged_or_gone_are_run_again() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (out, path) = (dir.path().join("out"), dir.path().join("out/results.jsonl"));
+    let words = ["builtin:box:8", "--methods", "qmat", "--spheres", "30,20,10"];
+    compare(&words, &out);
+    let mut lines = records(&out);
+    lines[0]["evaluate"]["hausdorff"] = Value::Null;
+    fs::remove_file(out.join(lines[1]["artifact"].as_str().expect("a name"))).expect("removed");
+    // A record without a medial mesh lacks none.
+    lines[2].as_object_mut().expect("a record").remove("artifact");
+    let lines: Vec<String> = lines.iter().map(Value::to_string).collect();
+    fs::write(&path, lines.join("\n") + "\n").expect("written");
+    let more = ["--samples", "200", "--counts-only", "--out", text(&out)];
+    let (_, stdout, stderr) = run(&[&["compare"], &words[..], &more].concat());
+    assert!(stdout.contains("2 run now, 1 found") && stderr.contains("1; line 1"), "{stderr}");
+    assert_eq!(run_and_found(&compare(&words, &out).1), (0, 3));
+}
+
+#[test]
+#[cfg(unix)]
+fn nothing_outside_of_a_store_is_written_copied_or_removed() {
+    let at = folder();
+    let (out, path, mine) = (at("out"), at("out/results.jsonl"), at("mine.ma"));
+    let words = ["compare", "builtin:box:8", "--methods", "qmat", "--spheres", "20", "-q", "--out"];
+    done(&[&words[..], &[&out]].concat());
+    fs::write(&mine, "mine").expect("written");
+    for name in [".lock", "index.html", "results.csv", "plots/x.svg", "axes/box-8"] {
+        let own = format!("{out}/{name}");
+        let _ = fs::remove_file(&own).or_else(|_| fs::remove_dir_all(&own));
+        std::os::unix::fs::symlink(at("."), &own).expect("linked");
+        refused(&[&words[..], &[&out, "--fresh"]].concat(), 1, "a link or not");
+        fs::remove_file(&own).expect("a link");
+    }
+    let artifact = records(&out)[0]["artifact"].as_str().expect("a name").to_owned();
+    let text = fs::read_to_string(&path).expect("results");
+    for (all, elsewhere) in [("1", &*mine), ("2", "axes/../../mine.ma"), ("3", "study.toml")] {
+        fs::write(&path, text.replace(&artifact, elsewhere)).expect("written");
+        let (_, object) = json(&["report", &out, "--out", &at(all)]);
+        assert!(object["warnings"].to_string().contains("no medial mesh of this"), "{object}");
+    }
+    // The folder itself may be a link.
+    std::os::unix::fs::symlink(&out, at("link")).expect("linked");
+    fs::write(&path, text.replace(&artifact, "axes/../../mine.ma")).expect("written");
+    done(&[&words[..], &[&at("link"), "--fresh"]].concat());
+    assert_eq!((fs::read_to_string(mine).expect("kept"), records(&out).len()), ("mine".into(), 2));
+}
+
+#[test]
+#[cfg(unix)]
+fn pipes_devices_and_odd_names_are_refused_at_once() {
+    let at = folder();
+    fs::create_dir(at("out")).expect("made");
+    assert!(Command::new("mkfifo").arg(at("out/results.jsonl")).status().expect("runs").success());
+    for words in [
+        &["compare", "builtin:box:8", "--out", &at("out")][..],
+        &["diff", &at("out"), &at("out")],
+        &["compare", "--study", "/dev/zero"],
+        &["compare", "--plugins", "/dev/zero"],
+        &["compare", "--plugins", &at("out/results.jsonl")],
+    ] {
+        let (code, _, stderr) = run(words);
+        assert!(code > 0 && stderr.contains("not a regular file"), "{words:?}: {stderr}");
+    }
+    let odd: std::ffi::OsString = std::os::unix::ffi::OsStringExt::from_vec(b"odd\xff.off".into());
+    fs::write(Path::new(&at("")).join(&odd), "").expect("written");
+    let output = Command::new(MEDIAL).arg("compare").arg(odd).current_dir(at("")).output();
+    let message = String::from_utf8_lossy(&output.expect("runs").stderr).into_owned();
+    assert!(message.contains("odd") && message.contains("not UTF-8"), "{message}");
 }
 
 #[test]
@@ -371,12 +447,6 @@ fn shards_merge_into_what_one_run_gives() {
         .replace("\"result_hash\":\"", "\"result_hash\":\"0");
     fs::create_dir(at("4")).expect("made");
     fs::write(at("4/results.jsonl"), altered).expect("written");
-    for record in records(at("4")) {
-        let artifact = record["artifact"].as_str().expect("a medial mesh");
-        let to = at("4").join(artifact);
-        fs::create_dir_all(to.parent().expect("a folder")).expect("made");
-        fs::copy(at("2").join(artifact), to).expect("copied");
-    }
     let (_, object) = json(&["report", &path("2"), &path("4"), "--out", &path("both")]);
     assert!(object["warnings"].to_string().contains("differ; the newer one"), "{object}");
     refused(&["compare", "builtin:box:8", "--shard", "4/3"], 2, "--shard 4/3");
