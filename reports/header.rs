@@ -23,6 +23,32 @@ pub struct Header {
     /// Remarks on all of it, such as lines of the results that could not be read.
     #[serde(default)]
     pub notes: Vec<String>,
+    /// The state of a comparison that still adds records; `None` once it has ended.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub running: Option<Running>,
+}
+
+/// How far a comparison is that still adds records.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Running {
+    /// Number of methods that have all their results.
+    pub done: usize,
+    /// Number of methods that were requested.
+    pub total: usize,
+    /// The methods without all their results, in the order in which they run.
+    pub missing: Vec<String>,
+}
+
+impl Running {
+    /// The banner of the page.
+    pub(crate) fn banner(&self) -> String {
+        let missing = match self.missing.is_empty() {
+            true => String::new(),
+            false => format!("; missing: {}", self.missing.join(", ")),
+        };
+        let methods = if self.total == 1 { "method" } else { "methods" };
+        format!("{} of {} {methods} done{missing}.", self.done, self.total)
+    }
 }
 
 /// One run of the program that added records.

@@ -38,7 +38,7 @@ mod text;
 mod view3d;
 mod write;
 
-pub use header::{Header, MethodNote, RunNote};
+pub use header::{Header, MethodNote, RunNote, Running};
 pub use journal::{
     BadLine, Journal, JournalError, Journaled, check_regular, parse_records, read_records,
     write_records,

@@ -120,6 +120,7 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
         methods: earlier.methods,
         study: fs::read_to_string(dir.join(STUDY)).ok(),
         notes: warnings.to_vec(),
+        running: None,
     };
     for record in records {
         if !header

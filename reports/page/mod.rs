@@ -16,7 +16,7 @@ use flate2::write::GzEncoder;
 use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, level_label};
-use crate::header::{Header, RunNote};
+use crate::header::{Header, RunNote, Running};
 use crate::metric::{BELOW_30, COMPARED, EPSILON, Metric, SPHERES_ONLY};
 use crate::plots::{Figure, symbol};
 use crate::record::{Machine, Status};
@@ -190,6 +190,7 @@ impl Page<'_> {
             "command": command,
             "earlier": runs.split_last().map_or(&[][..], |(_, earlier)| earlier).iter().map(earlier).collect::<Vec<_>>(),
             "study": header.study,
+            "running": header.running.as_ref().map(Running::banner),
             "alert": self.alert(),
             "notices": header.notes.iter().cloned().chain(comparison.cautions()).collect::<Vec<_>>(),
             "series": series.collect::<Vec<_>>(),

@@ -191,6 +191,10 @@ const start = async () => {
   const curves = overview.filter((figure) => figure.leading);
   const others = overview.filter((figure) => !figure.leading);
   const parts = [];
+  if (report.running) {
+    parts.push(make("p", { class: "notice running", role: "status" }, make("strong", {}, "Still running: "), report.running,
+      " This page shows the results so far; reload it for more."));
+  }
   if (report.alert) {
     parts.push(make("p", { class: "notice bad", role: "alert" }, report.alert));
   }
