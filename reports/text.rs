@@ -17,6 +17,12 @@ pub fn significant(value: f64, digits: usize) -> String {
     format!("{value:.decimals$}")
 }
 
+/// A number with at most four significant digits and no trailing zero: `0.3333`, `60`.
+pub(crate) fn trimmed(value: f64) -> String {
+    let text = significant(value, 4);
+    text.parse::<f64>().map_or(text, |rounded| rounded.to_string())
+}
+
 /// The least of 1, 2 and 5 times a power of ten that is not below a positive number.
 pub(crate) fn round_up(value: f64) -> f64 {
     let power = 10.0_f64.powf(value.log10().floor());
@@ -136,6 +142,7 @@ mod tests {
         assert_eq!(significant(34_702.4, 3), "34702");
         assert_eq!(significant(1.234e-9, 3), "1.23e-9");
         assert_eq!(significant(-0.5, 2), "-0.50");
+        assert_eq!([1.0 / 3.0, 60.0, 0.30000000000000004].map(trimmed), ["0.3333", "60", "0.3"]);
     }
 
     #[test]

@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use medial::Vec3;
 use medial::complex::{ContourError, MedialMesh, union_surface};
+use medial::metrics::JudgeOptions;
 use medial::shape::{Cost, Shape, ShapeOptions};
 use medial::surface::{SignedDistance, TriMesh};
 use medial_reports::render::{
     Background, Bar, Camera, ColourBy, Errors, Frame, Layer, Panel, Picture, RenderError, Scale,
     Scene, Strip, strip,
 };
+use medial_reports::significant;
 use serde_json::json;
 
 use crate::args::{Global, MeshArgument, fraction};
@@ -18,7 +20,7 @@ use crate::exit::{Exit, Failure};
 use crate::files::{self, check_extension, check_folder, shape_of};
 use crate::output::{counted, print_result};
 use crate::progress::StageLine;
-use crate::study::external::{AxisOptions, percent, read_axis};
+use crate::study::external::{AxisOptions, read_axis};
 
 /// Arguments of `render`.
 #[derive(Debug, Args)]
@@ -53,7 +55,8 @@ pub struct Arguments {
     /// `white`, `black`, `transparent` or `#rrggbb`.
     #[arg(long, value_name = "COLOUR", default_value = "white", value_parser = background)]
     background: Background,
-    /// The end of the scale of errors, as a fraction of the diagonal [default: 99 % of the errors are within it].
+    /// The end of the scale of errors, as a fraction of the diagonal; larger errors have its last colour [default: 90 %
+    /// of the errors are within it, of several medial meshes by the better half].
     #[arg(long, value_name = "FRACTION", value_parser = fraction)]
     max_error: Option<f64>,
     /// Largest distance of a reconstruction from the boundary of the union, as a fraction of the diagonal.
@@ -109,15 +112,19 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let read = Read::new(arguments)?;
     let camera = camera(arguments, read.shape.mesh());
     line.at("making the reconstructions");
-    let deviations = match show {
-        Show::Error | Show::Reconstruction => arguments
-            .axes
-            .iter()
-            .zip(&read.axes)
-            .map(|(path, axis)| Deviation::new(&read.shape, path, axis, arguments.tolerance))
-            .collect::<Result<Vec<_>, _>>()?,
-        Show::Surface | Show::Axis => vec![],
-    };
+    let mut deviations = vec![];
+    if matches!(show, Show::Error | Show::Reconstruction) {
+        // What `evaluate` measures by default: the drawn vertices are fewer and give another number.
+        let judge = (show == Show::Error).then(|| read.shape.judge(None, JudgeOptions::default()));
+        let judge = judge.transpose().map_err(|error| Failure::at(&arguments.mesh, error))?;
+        for (path, axis) in arguments.axes.iter().zip(&read.axes) {
+            let mut made = Deviation::new(&read.shape, path, axis, arguments.tolerance)?;
+            let measured = judge.as_ref().map(|judge| judge.evaluate(axis)).transpose();
+            let measured = measured.map_err(|error| Failure::at(path, error))?;
+            made.hausdorff = measured.map(|evaluation| evaluation.distances.hausdorff);
+            deviations.push(made);
+        }
+    }
     line.at("drawing");
     let (picture, drawing) = Cost::of(|| match read.axes.len() {
         // A single picture has room for a bar of colours, a strip has one scale for all.
@@ -130,13 +137,18 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     files::write(output, &bytes)?;
     drop(line);
     let (width, height) = (picture.width(), picture.height());
-    let errors = deviations.iter().map(|d| json!({ "max": d.max(), "mean": d.mean() }));
+    let errors = deviations
+        .iter()
+        .map(|d| json!({ "max": d.max(), "mean": d.mean(), "hausdorff": d.hausdorff }));
     let object = json!({
         "output": output, "width": width, "height": height,
         "direction": camera.direction.to_array(), "up": camera.up.to_array(),
         "errors": errors.collect::<Vec<_>>(), "seconds": drawing.seconds,
     });
-    let text = format!("{}: {width} x {height} pixels", output.display());
+    let mut text = format!("{}: {width} x {height} pixels", output.display());
+    for words in deviations.iter().filter_map(Deviation::hausdorff) {
+        text = text + "; " + &words;
+    }
     Ok(print_result(global, &object, &text, &read.warnings))
 }
 
@@ -259,6 +271,8 @@ struct Deviation {
     mesh: TriMesh,
     /// Positive outside.
     values: Vec<f64>,
+    /// The Hausdorff error of the medial mesh, where it was measured.
+    hausdorff: Option<f64>,
 }
 
 impl Deviation {
@@ -279,7 +293,7 @@ impl Deviation {
         let tree = shape.surface_tree().map_err(Failure::input)?;
         let inside = shape.inside_test();
         let values = SignedDistance::closed(&tree, &inside).batch(&mesh.vertices);
-        Ok(Self { mesh, values })
+        Ok(Self { mesh, values, hausdorff: None })
     }
 
     fn max(&self) -> f64 {
@@ -291,8 +305,13 @@ impl Deviation {
     }
 
     fn errors(&self) -> Errors<'_> {
-        let caption = format!("error up to {}, mean {}", percent(self.max()), percent(self.mean()));
+        let caption = self.hausdorff().unwrap_or_default();
         Errors { mesh: &self.mesh, values: &self.values, caption }
+    }
+
+    /// The Hausdorff error in words.
+    fn hausdorff(&self) -> Option<String> {
+        Some(format!("Hausdorff {} % of the diagonal", significant(100.0 * self.hausdorff?, 3)))
     }
 }
 

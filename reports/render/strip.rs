@@ -7,7 +7,7 @@ use super::RenderError;
 use super::camera::{Camera, Frame};
 use super::picture::{Background, Bar, LINE, Picture, fitted, letter_size, text_width};
 use super::scene::{Layer, Scale, Scene};
-use crate::text::{round_up, significant};
+use crate::text::round_up;
 
 /// What medial meshes are coloured by, before the scale is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -40,42 +40,40 @@ pub struct Errors<'a> {
     pub caption: String,
 }
 
-/// Share of the values that a scale chosen from them spans; the rest has the colours of its ends.
-const SPANNED: f64 = 0.99;
+/// Share of the values of a surface that a scale chosen from them spans; the rest has the colours of its ends.
+const SPANNED: f64 = 0.9;
 
 impl Errors<'_> {
-    /// The largest distance.
-    pub fn largest(&self) -> f64 {
-        self.values.iter().copied().map(f64::abs).fold(0.0, f64::max)
+    /// The distance that 90 % of the vertices are within.
+    fn usual(&self) -> f64 {
+        let mut sizes: Vec<f64> = self.values.iter().map(|value| value.abs()).collect();
+        sizes.sort_by(f64::total_cmp); // a total order: the same scale each time
+        let place = (sizes.len().saturating_sub(1) as f64 * SPANNED) as usize;
+        sizes.get(place).copied().unwrap_or(0.0)
     }
 
-    /// The end of a scale for several surfaces, in their unit: 99 % of the vertices of the median one are within it,
-    /// so that a single bad one does not make all others look alike. Round as a percentage of a diagonal.
+    /// The end of a scale for several surfaces, in their unit. It is chosen for the better half of them, whose errors it
+    /// must show: the geometric mean of the distances that 90 % of the vertices of each are within. Round as a percentage
+    /// of a diagonal.
     pub fn common_scale(all: &[&Self], diagonal: f64) -> f64 {
-        let mut ends: Vec<f64> = (all.iter())
-            .map(|errors| {
-                let mut sizes: Vec<f64> = errors.values.iter().map(|value| value.abs()).collect();
-                sizes.sort_by(f64::total_cmp); // a total order: the same scale each time
-                let place = (sizes.len().saturating_sub(1) as f64 * SPANNED) as usize;
-                sizes.get(place).copied().unwrap_or(0.0)
-            })
-            .collect();
+        let mut ends: Vec<f64> = all.iter().map(|errors| errors.usual() / diagonal).collect();
         ends.sort_by(f64::total_cmp);
-        // The lower median: of two the one that shows more of the smaller errors.
-        let median = ends.get(ends.len().saturating_sub(1) / 2).map_or(0.0, |end| end / diagonal);
-        let percent = if median > 0.0 && median.is_finite() { 100.0 * median } else { 1.0 };
+        ends.truncate(ends.len().div_ceil(2));
+        ends.retain(|end| *end > 0.0 && end.is_finite()); // others have no logarithm
+        let mean = ends.iter().map(|end| end.ln()).sum::<f64>() / ends.len() as f64;
+        let percent = if ends.is_empty() { 1.0 } else { 100.0 * mean.exp() };
         round_up(percent) * diagonal / 100.0
     }
 
-    /// The bar of errors up to `end`, with the largest error where it is beyond.
+    /// The bar of errors up to `end`, with a remark where values are beyond.
     pub fn bar(all: &[&Self], end: f64, diagonal: f64) -> Bar {
-        let largest = all.iter().map(|errors| errors.largest()).fold(0.0, f64::max);
-        let beyond = significant(100.0 * largest / diagonal, 3);
+        let is_clipped = all.iter().any(|errors| errors.values.iter().any(|v| v.abs() > end));
+        let note: &[&str] = if is_clipped { &["larger values:", "last colour"] } else { &[] };
         Bar {
             scale: Scale::errors(end),
             times: 100.0 / diagonal,
             title: vec!["error".into(), "% of diagonal".into()],
-            note: if largest > end { vec![format!("largest {beyond}")] } else { vec![] },
+            note: note.iter().map(|line| (*line).to_owned()).collect(),
         }
     }
 }

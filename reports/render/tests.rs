@@ -209,6 +209,24 @@ fn a_strip_has_a_panel_for_each_and_a_bar() {
     assert_eq!(strip(&[], &common), Err(RenderError::Empty));
 }
 
+/// Most of a comparison's panels are far from the surface: the scale is for those that are near.
+#[test]
+fn the_scale_of_errors_shows_the_better_half() {
+    let surface = sphere(1.0, 4);
+    let sizes = [0.004, 0.005, 0.006, 0.2, 0.25, 0.3, 0.4];
+    let values = sizes.map(|size| vec![2.0 * size; surface.vertices.len()]);
+    let panels: Vec<Errors<'_>> = (values.iter())
+        .map(|values| Errors { mesh: &surface, values, caption: String::new() })
+        .collect();
+    let all: Vec<&Errors<'_>> = panels.iter().collect();
+    let end = Errors::common_scale(&all, 2.0) / 2.0;
+    assert!((0.01..=0.02).contains(&end), "{end}");
+    assert_eq!(Errors::bar(&all, 2.0 * end, 2.0).note, ["larger values:", "last colour"]);
+    assert!(Errors::bar(&all[..2], 2.0 * end, 2.0).note.is_empty());
+    let flat = Errors { values: &[0.0; 3], ..panels[0].clone() };
+    assert_eq!(Errors::common_scale(&[&flat], 1.0), 0.01, "1 % where there is no error");
+}
+
 #[test]
 fn what_makes_no_picture_is_said() {
     let mesh = sphere(1.0, 4);

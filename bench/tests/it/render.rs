@@ -42,6 +42,21 @@ fn every_kind_of_picture_is_written() {
     }
 }
 
+/// One result has one error: that of `evaluate`, not that of the vertices that are drawn.
+#[test]
+fn the_error_of_a_picture_is_that_of_evaluate() {
+    let at = folder();
+    let (mesh, axis, out) = ("builtin:torus", at("axis.ma"), at("x.png"));
+    done(&["simplify", mesh, "-m", "qmat", "--spheres", "20", "-o", &axis]);
+    let words = ["--show", "error", "--tolerance", "0.03", "--size", "160x120", "-o", &out];
+    let arguments = [&["render", mesh, &axis], &words[..]].concat();
+    let (_, drawn) = json(&arguments);
+    let (_, evaluated) = json(&["evaluate", mesh, &axis]);
+    assert_eq!(drawn["errors"][0]["hausdorff"], evaluated["hausdorff"]);
+    let percent = 100.0 * evaluated["hausdorff"].as_f64().expect("a number");
+    assert!(done(&arguments).contains(&format!("Hausdorff {percent:.3} %")), "{percent}");
+}
+
 #[test]
 fn wrong_words_are_named_and_nothing_is_written() {
     let at = folder();
