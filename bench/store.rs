@@ -7,10 +7,12 @@
 use std::collections::HashMap;
 use std::fs::{DirEntry, File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use medial_reports::{Journal, JournalError, Record, Status, Target, check_regular, parse_records};
+use medial_reports::{
+    Journal, JournalError, Record, Status, Target, check_regular, file_inside, parse_records,
+};
 
 use crate::study::item::Item;
 
@@ -288,14 +290,7 @@ fn read_known(path: &Path) -> io::Result<(HashMap<String, Record>, Vec<String>)>
 pub fn artifact_path(dir: &Path, artifact: &str) -> Option<PathBuf> {
     let named = Path::new(artifact);
     let is_own = named.starts_with(AXES) && named.extension().is_some_and(|end| end == "ma");
-    let mut path = dir.to_owned();
-    for part in named.components() {
-        path.push(part);
-        if !is_own || !matches!(part, Component::Normal(_)) || path.is_symlink() {
-            return None;
-        }
-    }
-    Some(path)
+    file_inside(dir, artifact).filter(|_| is_own)
 }
 
 fn remove(path: &Path) -> Result<(), StoreError> {

@@ -27,11 +27,21 @@ const BOUND: f64 = 1.0;
 /// Triangles of a result with a larger error are no merit, in % of the diagonal.
 const USABLE: f64 = 2.0;
 
+/// A larger error answers no question, in % of the diagonal: no result is better than such a one.
+const ANSWERS: f64 = 5.0;
+
 /// Values that differ by a smaller share are called equal: about what other samples change.
 const EQUAL: f64 = 0.01;
 
-/// One value for each mesh, infinite where there is none; `None` where the method was not asked.
-type Values = Vec<Option<f64>>;
+/// For each mesh the least value of a method; `None` where the method was not asked.
+type Values = Vec<Option<Found>>;
+
+/// A value and the seconds of the result that has it; infinite and unknown without a result.
+#[derive(Clone, Copy)]
+struct Found {
+    value: f64,
+    seconds: f64,
+}
 
 /// A question and the value that decides it; less is better.
 struct Question {
@@ -44,40 +54,45 @@ struct Question {
     of: &'static str,
 }
 
-/// The table of answers; `None` where nothing can be compared.
+/// The table of answers; `None` where nothing can be compared. Of one mesh there are results instead of medians.
 pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Table> {
     let mut rows = vec![];
     if let Some((level, spheres)) = usual_level(comparison) {
         rows.extend(at_count(comparison, level, spheres));
     }
     rows.extend(within_bound(comparison));
-    (!rows.is_empty()).then(|| Table {
+    let is_one = comparison.meshes.len() == 1;
+    let rule = format!(
+        "Among the levels that were run. The initial medial mesh and errors above {ANSWERS} % answer no question."
+    );
+    let medians = format!(
+        "Medians over the meshes that a method ran on: a missing result counts as infinite, and a method needs results \
+         on half of its meshes. Where the best median and the most results belong to two methods, both are named. The \
+         ratio to the runner-up is a geometric mean over the meshes where both have a result. The last column counts \
+         the meshes on which the first one is better, equal within {:.0} %, worse.",
+        100.0 * EQUAL
+    );
+    let notes = [how.to_owned(), rule].into_iter().chain((!is_one).then_some(medians));
+    let columns = [
+        "criterion",
+        "method",
+        if is_one { "result" } else { "median" },
+        "time (s)",
+        "meshes",
+        "runner-up",
+        "ratio to it",
+        "better, equal, worse",
+    ];
+    let table = Table {
         caption: "Which method?".to_owned(),
-        notes: vec![
-            how.to_owned(),
-            format!(
-                "Medians over the meshes that a method ran on, among the levels that were run. A missing result counts \
-                 as infinite, and a method needs results on half of its meshes. Where the best median and the most \
-                 results belong to two methods, both are named. The ratio to the runner-up is a geometric mean over \
-                 the meshes where both have a result. The last column counts the meshes on which the first one is \
-                 better, equal within {:.0} %, worse.",
-                100.0 * EQUAL
-            ),
-        ],
-        columns: [
-            "criterion",
-            "method",
-            "median",
-            "meshes",
-            "runner-up",
-            "ratio to it",
-            "better, equal, worse",
-        ]
-        .map(Column::text)
-        .into(),
+        notes: notes.collect(),
+        columns: columns.map(Column::text).into(),
         rows,
         grouped: false,
-    })
+    };
+    // Counts of meshes say nothing about one mesh.
+    let counts: &[&str] = if is_one { &["meshes", "better, equal, worse"] } else { &[] };
+    (!table.rows.is_empty()).then(|| table.without(counts))
 }
 
 /// The answers at one number of spheres.
@@ -161,7 +176,8 @@ pub(crate) fn usual_level(comparison: &Comparison<'_>) -> Option<(usize, usize)>
         })
 }
 
-/// For each series and mesh the least value of its results, at one level or at all of them.
+/// For each series and mesh the least value of its results, at one level or at all of them. The medial mesh that all
+/// methods start from is no method's result.
 fn values(
     comparison: &Comparison<'_>,
     level: Option<usize>,
@@ -169,27 +185,43 @@ fn values(
 ) -> Vec<Values> {
     let mut all: Vec<Values> = vec![vec![None; comparison.meshes.len()]; comparison.series.len()];
     for entry in &comparison.entries {
-        if level.is_none_or(|level| entry.level == level) {
-            let least = all[entry.series][entry.mesh].get_or_insert(f64::INFINITY);
+        if level.is_none_or(|level| entry.level == level) && !comparison.is_start(entry.series) {
+            let seconds = TOTAL_SECONDS.of(entry.record).unwrap_or(f64::INFINITY);
             // A run without a result counts as infinitely bad, a mesh without a run not at all.
-            *least = least.min(value(entry).unwrap_or(f64::INFINITY));
+            let value = value(entry).unwrap_or(f64::INFINITY);
+            let least = all[entry.series][entry.mesh].get_or_insert(Found { value, seconds });
+            if value < least.value {
+                *least = Found { value, seconds };
+            }
         }
     }
     all
 }
 
-/// The errors of the results at a count.
+/// The errors of the results at a count, as far as they answer a question.
 fn errors_at(comparison: &Comparison<'_>, level: usize) -> Vec<Values> {
     values(comparison, Some(level), |entry| {
-        HAUSDORFF.of(entry.record).filter(|_| entry.comparable())
+        HAUSDORFF.of(entry.record).filter(|&error| entry.comparable() && error <= ANSWERS)
     })
+}
+
+/// The median; infinities count. Of an even number the geometric mean of the middle two, or the lower one where the
+/// upper is infinite. `None` where more than half are infinite.
+fn middle(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut known: Vec<f64> = values.collect();
+    known.sort_by(f64::total_cmp); // infinities last
+    let middle =
+        [known.len().saturating_sub(1) / 2, known.len() / 2].map(|k| known.get(k).copied());
+    match middle {
+        [Some(low), Some(high)] if high.is_finite() && low != high => Some((low * high).sqrt()),
+        [low, _] => low.filter(|value| value.is_finite()),
+    }
 }
 
 /// What a series is ranked by.
 struct Rank {
     series: usize,
-    /// Of an even number the geometric mean of the middle two, or the lower one where the upper has no result: at
-    /// least half of the meshes have one. `None` where fewer have.
+    /// `None` where fewer than half of the meshes have a result.
     median: Option<f64>,
     /// Meshes without a result, of those asked.
     missed: usize,
@@ -199,20 +231,13 @@ struct Rank {
 
 impl Rank {
     fn of(series: usize, values: &Values) -> Self {
-        let mut known: Vec<f64> = values.iter().flatten().copied().collect();
-        known.sort_by(f64::total_cmp); // infinities last
-        let middle =
-            [known.len().saturating_sub(1) / 2, known.len() / 2].map(|k| known.get(k).copied());
-        let median = match middle {
-            [Some(low), Some(high)] if high.is_finite() && low != high => Some((low * high).sqrt()),
-            [low, _] => low.filter(|value| value.is_finite()),
-        };
-        // Infinite values are sorted to the end. A perfect result is zero and has no logarithm.
-        let results = &known[..known.partition_point(|value| value.is_finite())];
+        let known: Vec<f64> = values.iter().flatten().map(|found| found.value).collect();
+        // A perfect result is zero and has no logarithm.
+        let results: Vec<f64> = known.iter().copied().filter(|value| value.is_finite()).collect();
         let sum: f64 = results.iter().map(|value| value.max(1e-9).ln()).sum();
         Self {
             series,
-            median,
+            median: middle(known.iter().copied()),
             missed: known.len() - results.len(),
             mean: sum / results.len().max(1) as f64,
         }
@@ -238,7 +263,7 @@ fn by_meshes(a: &Rank, b: &Rank) -> Ordering {
 /// on how many it is better, equal, worse.
 fn lead(first: &Values, second: &Values) -> Option<(f64, String)> {
     let ratios: Vec<f64> = (first.iter().zip(second))
-        .filter_map(|(a, b)| Some(((*a)?, (*b)?)))
+        .filter_map(|(a, b)| Some((a.as_ref()?.value, b.as_ref()?.value)))
         .filter(|(a, b)| a.is_finite() && b.is_finite())
         // Floors: a quotient of zeros is no number.
         .map(|(a, b)| a.max(1e-9) / b.max(1e-9))
@@ -280,12 +305,14 @@ fn answer(
 ) -> Vec<Cell> {
     let first = ranks[0].series;
     let known = question.values[first].iter().flatten();
-    let met = known.clone().filter(|value| value.is_finite()).count();
+    let met = known.clone().filter(|found| found.value.is_finite());
+    let seconds = middle(met.clone().map(|found| found.seconds));
     let mut cells = vec![
         Cell::from(title),
         Cell { best: true, ..Cell::from(comparison.series[first].as_str()) },
         Cell::optional(ranks[0].median.map(question.text)),
-        Cell::from(format!("{met} of {}", counted(known.count(), "mesh", "meshes"))),
+        Cell::optional(seconds.map(|seconds| significant(seconds, 3))),
+        Cell::from(format!("{} of {}", met.count(), counted(known.count(), "mesh", "meshes"))),
     ];
     let runner_up = ranks.get(1).and_then(|rank| {
         Some((rank.series, lead(&question.values[first], &question.values[rank.series])?))
@@ -315,7 +342,7 @@ fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) ->
     let title = format!("topology right everywhere, lowest error at {spheres}");
     if ranks.is_empty() {
         let mut cells = vec![Cell::from(title), Cell::from("none")];
-        cells.extend([(); 5].map(|()| Cell::optional(None)));
+        cells.extend([(); 6].map(|()| Cell::optional(None)));
         return cells;
     }
     answer(comparison, &error_question(errors, title.clone()), title, &ranks)

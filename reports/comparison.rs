@@ -6,8 +6,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::Target;
 
+use crate::metric::HAUSDORFF;
 use crate::record::{Record, Status};
-use crate::text::{counted, grouped, printable};
+use crate::text::{counted, grouped, printable, trimmed};
 
 /// Largest relative difference between the spheres reached and the spheres asked at which two
 /// results still count as results at the same number of spheres. Methods that search on a level
@@ -70,7 +71,7 @@ pub(crate) fn level_label(level: Target) -> String {
     match level {
         Target::Spheres(count) => grouped(count as u64),
         Target::Published => "published".to_owned(),
-        Target::Native(value) => format!("level {value}"),
+        Target::Native(value) => format!("level {}", trimmed(value)),
         Target::MaxError(_) => level.to_string(),
     }
 }
@@ -141,6 +142,24 @@ impl<'a> Comparison<'a> {
         here.collect()
     }
 
+    /// Whether the Hausdorff error of an entry is above one of fewer spheres, among the results of its method on its mesh
+    /// at requested counts and error bounds.
+    pub(crate) fn is_rising(&self, entry: &Entry<'_>) -> bool {
+        let point = |entry: &Entry<'_>| {
+            let record = entry.record;
+            let is_counted = entry.measured() && !record.simplify.level.is_native();
+            Some((reached(record).filter(|_| is_counted)? as f64, HAUSDORFF.of(record)?))
+        };
+        let own = self.of_mesh(entry.mesh).filter(|other| other.series == entry.series);
+        let points: Vec<(f64, f64)> = own.filter_map(point).collect();
+        point(entry).is_some_and(|own| rises(own, &points))
+    }
+
+    /// Whether a series is the medial mesh that all methods start from.
+    pub(crate) fn is_start(&self, series: usize) -> bool {
+        self.methods[series] == "initial"
+    }
+
     /// The sphere counts that were asked, with their level indices, from many to few.
     pub(crate) fn counts(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.levels.iter().enumerate().filter_map(|(index, level)| match level {
@@ -180,6 +199,20 @@ impl<'a> Comparison<'a> {
         }
         cautions
     }
+}
+
+/// An error that is larger than one of fewer spheres by more than this share is not monotone.
+const RISE: f64 = 0.05;
+
+/// The mark of such an error, and its meaning.
+pub(crate) const RISING: &str = " †";
+pub(crate) const RISING_NOTE: &str = "†: non-monotone, more than 5 % above the error of the same method with fewer \
+    spheres.";
+
+/// Whether the error of a result is larger by more than 5 % than one of fewer spheres, among results of one method as
+/// numbers of spheres and errors.
+pub(crate) fn rises((spheres, error): (f64, f64), results: &[(f64, f64)]) -> bool {
+    results.iter().any(|&(fewer, least)| fewer < spheres && error > (1.0 + RISE) * least)
 }
 
 /// The records that count: of one mesh, row and level the last one, whatever build made it. Records

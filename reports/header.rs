@@ -14,7 +14,8 @@ pub struct Header {
     /// The runs that made the records, in their order.
     #[serde(default)]
     pub runs: Vec<RunNote>,
-    /// The methods that were run, for their names and citations.
+    /// The methods that can run or have records, for their names and citations. Those without a record are named as
+    /// not run.
     #[serde(default)]
     pub methods: Vec<MethodNote>,
     /// The study that was asked last, as a file.
@@ -107,6 +108,13 @@ impl MethodNote {
             native: info.native.as_ref().map(|native| format!("{} ({})", native.name, native.unit)),
         }
     }
+
+    /// The first clause on what the method is best suited for.
+    pub(crate) fn briefly(&self) -> Option<String> {
+        let clause = self.home.split([',', ';', ':', '.']).next()?;
+        let mut letters = clause.chars();
+        Some(letters.next()?.to_lowercase().chain(letters).collect())
+    }
 }
 
 impl Header {
@@ -133,6 +141,32 @@ impl Header {
         entries.join("\n\n") + "\n"
     }
 
+    /// The methods without a record of a comparison, unless they are still to run.
+    pub(crate) fn not_run(&self, methods: &[&str]) -> Vec<&MethodNote> {
+        let awaited = |id: &String| self.running.as_ref().is_some_and(|r| r.missing.contains(id));
+        let notes = self.methods.iter();
+        notes.filter(|note| !methods.contains(&note.id.as_str()) && !awaited(&note.id)).collect()
+    }
+
+    /// The command that adds results of methods to those of the last run.
+    pub(crate) fn command_with(&self, methods: &[&str]) -> String {
+        let last = self.runs.last().and_then(|run| run.command.strip_prefix("medial compare"));
+        let mut words = last.unwrap_or(" MESH --out DIR").split(' ').skip(1);
+        let mut command = "medial compare".to_owned();
+        while let Some(word) = words.next() {
+            match word {
+                // They name other methods, or would run the rest again.
+                "--methods" | "--set" | "--levels" | "--after-filters" | "--shard" => {
+                    words.next();
+                }
+                "--fresh" | "--retry-failed" => {}
+                _ if word.starts_with("--methods=") => {}
+                _ => command = command + " " + word,
+            }
+        }
+        format!("{command} --methods {}", methods.join(","))
+    }
+
     /// How the files were made: a sentence that stands in each of them.
     pub(crate) fn how(&self) -> String {
         let Some(run) = self.runs.last() else { return "Made by medial.".to_owned() };
@@ -144,5 +178,27 @@ impl Header {
         let end = command.unwrap_or_else(|| ".".to_owned());
         let parts = [version, earlier, date].map(Option::unwrap_or_default).concat();
         format!("Made by medial{parts}{end}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_that_adds_methods_keeps_meshes_and_folder() {
+        let adding = |command: &str| {
+            let run = RunNote { command: command.to_owned(), ..RunNote::default() };
+            Header { runs: vec![run], ..Header::default() }.command_with(&["tight", "vmas"])
+        };
+        assert_eq!(
+            adding(
+                "medial compare 'a b.off' --fresh --methods qmat --set qmat.k=1 --spheres=50 --out x"
+            ),
+            "medial compare 'a b.off' --spheres=50 --out x --methods tight,vmas"
+        );
+        for other in ["medial report a b --out c", ""] {
+            assert_eq!(adding(other), "medial compare MESH --out DIR --methods tight,vmas");
+        }
     }
 }

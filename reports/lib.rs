@@ -8,11 +8,11 @@
 //! | `comparison` | records arranged by mesh, method and level |
 //! | `metric` | the columns: name, unit, direction, definition |
 //! | `summary` | means over meshes at equal numbers of spheres and at native levels |
+//! | `overview` | all methods at one number of spheres: the end of a comparison |
 //! | `answers` | which method for which purpose, at equal counts and equal errors |
 //! | `tables` | CSV, Markdown, LaTeX |
 //! | `plots` | figures, and their SVG |
 //! | [`history`] | one file for each run, change points over many runs |
-//! | `terminal` | the summary in plain text |
 //! | `pictures` | which results are shown next to each other |
 //! | [`render`] | pictures of surfaces and medial meshes as PNG |
 //! | `view3d` | geometry of the 3D views |
@@ -26,6 +26,7 @@ mod header;
 pub mod history;
 mod journal;
 mod metric;
+mod overview;
 mod page;
 mod pictures;
 mod plots;
@@ -33,7 +34,6 @@ mod record;
 pub mod render;
 mod summary;
 mod tables;
-mod terminal;
 mod text;
 mod view3d;
 mod write;
@@ -44,11 +44,12 @@ pub use journal::{
     write_records,
 };
 pub use metric::{Better, METRICS, Metric, measured_rows};
+pub use overview::summary_text;
 pub use pictures::{PictureStrip, picture_strips};
 pub use record::{
     Conditions, Initial, Machine, OwnSeconds, Record, Repetition, Simplify, Stages, Status, Target,
+    file_inside,
 };
-pub use terminal::summary_text;
 pub use text::{file_stem, printable, significant};
 pub use view3d::View3d;
 pub use write::{ReportError, read_header, write_report};

@@ -1,18 +1,19 @@
 //! Which results are shown beside each other as pictures.
 //!
 //! For each mesh one strip: the results of all methods at the number of spheres that the answers of
-//! [`answers`](crate::answers) are for, with the given files at theirs, and a 3D view of the same. Drawing needs the surfaces and the medial meshes, which are not in the
-//! records: it is for the caller, with [`strip`](crate::render::strip).
+//! [`answers`](crate::answers) are for, with external results at theirs, the least error first, and a 3D view of the
+//! same. Drawing needs the surfaces and the medial meshes, which are not in the records: it is for the caller, with
+//! [`strip`](crate::render::strip).
 
 use std::collections::BTreeMap;
 
 use medial::geometry::hash::splitmix;
 
 use crate::answers::usual_level;
-use crate::comparison::{Comparison, reached};
+use crate::comparison::{Comparison, Entry, reached};
 use crate::metric::HAUSDORFF;
 use crate::record::{Record, Status};
-use crate::text::{counted, file_stems, significant};
+use crate::text::{file_stems, grouped};
 
 /// Folders of the pictures and of the 3D views, beside the page.
 pub(crate) const FOLDER: &str = "pictures";
@@ -59,33 +60,55 @@ impl PictureStrip {
 /// The strips by mesh.
 pub(crate) fn strips(comparison: &Comparison<'_>) -> BTreeMap<usize, PictureStrip> {
     let mut strips: BTreeMap<usize, PictureStrip> = BTreeMap::new();
-    let Some((level, _)) = usual_level(comparison) else { return strips };
+    let Some((level, count)) = usual_level(comparison) else { return strips };
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
-    for entry in &comparison.entries {
-        let record = entry.record;
-        // A file of another program has one number of spheres, whatever that is.
-        let at_level = entry.level == level || record.status == Status::External;
-        let shown = at_level && entry.measured(); // a caption names the error
-        let Some(artifact) = record.artifact.clone().filter(|_| shown) else { continue };
-        let mut caption = comparison.series[entry.series].clone();
-        if let Some(spheres) = reached(record) {
-            caption.push_str(&format!(": {}", counted(spheres, "sphere", "spheres")));
-        }
-        if let Some(error) = HAUSDORFF.of(record) {
-            caption.push_str(&format!(", {} %", significant(error, 2)));
-        }
-        let strip = strips.entry(entry.mesh).or_insert_with(|| PictureStrip {
-            mesh: comparison.meshes[entry.mesh].clone(),
-            mesh_hash: record.mesh_hash.clone(), // the caller finds the surface by it
+    for (mesh, name) in comparison.meshes.iter().enumerate() {
+        let mut shown: Vec<(f64, &Entry<'_>)> = (comparison.of_mesh(mesh))
+            // A file of another program has one number of spheres, whatever that is.
+            .filter(|entry| entry.level == level || entry.record.status == Status::External)
+            .filter(|entry| entry.measured() && entry.record.artifact.is_some())
+            .filter_map(|entry| Some((HAUSDORFF.of(entry.record)?, entry))) // a caption names it
+            .collect();
+        shown.sort_by(|a, b| a.0.total_cmp(&b.0)); // the best first; equal ones stay in order
+        let panels: Vec<(String, String)> = (shown.iter())
+            .filter_map(|(error, entry)| {
+                let mut caption = comparison.series[entry.series].clone();
+                if let Some(spheres) = reached(entry.record).filter(|&spheres| spheres != count) {
+                    caption.push_str(&format!(" ({})", grouped(spheres as u64)));
+                }
+                caption.push_str(&format!(": Hausdorff {} %", HAUSDORFF.format(*error)));
+                Some((entry.record.artifact.clone()?, caption))
+            })
+            .collect();
+        let Some((_, first)) = shown.first() else { continue };
+        let mut strip = PictureStrip {
+            mesh: name.clone(),
+            mesh_hash: first.record.mesh_hash.clone(), // the caller finds the surface by it
             file: String::new(),
             view: String::new(),
-            panels: vec![],
-        });
-        strip.panels.push((artifact, caption)); // in the order of the table
-    }
-    // A name depends on all panels of the strip.
-    for (&mesh, strip) in &mut strips {
-        strip.name(&stems[mesh]);
+            panels,
+        };
+        strip.name(&stems[mesh]); // depends on all panels
+        strips.insert(mesh, strip);
     }
     strips
+}
+
+/// Of some meshes the one that tells most about the methods at the count of the strips: among those that the most
+/// methods ran on the one with the largest ratio of the worst error to the best.
+pub(crate) fn most_telling(
+    comparison: &Comparison<'_>,
+    meshes: impl Iterator<Item = usize>,
+) -> Option<usize> {
+    let level = usual_level(comparison).map(|(level, _)| level);
+    let ranked = meshes.map(|mesh| {
+        let here = || comparison.of_mesh(mesh).filter(|entry| Some(entry.level) == level);
+        let errors = here().filter(|entry| entry.measured()).filter_map(|e| HAUSDORFF.of(e.record));
+        let (least, most) =
+            errors.fold((f64::INFINITY, 0.0_f64), |(lo, hi), e| (lo.min(e), hi.max(e)));
+        (here().count(), most / least.max(1e-9), mesh)
+    });
+    // Of equal ones the first.
+    let best = ranked.max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(b.2.cmp(&a.2)));
+    best.map(|(_, _, mesh)| mesh)
 }

@@ -12,12 +12,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::comparison::{Comparison, Entry, level_label, reached};
+use crate::comparison::{Comparison, Entry, RISING, RISING_NOTE, level_label, reached, rises};
 use crate::header::Header;
 use crate::metric::{COMPARED, GEOMETRIC, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
-use crate::record::{Record, Stages, Status, Target};
+use crate::record::{Record, Status, Target};
 use crate::tables::{Cell, Table};
-use crate::text::{counted, grouped, significant};
+use crate::text::{counted, grouped, significant, trimmed};
 
 /// The method that others are put in relation to, where it ran with its defaults.
 const REFERENCE: &str = "qmat";
@@ -39,20 +39,12 @@ pub(crate) struct SeriesSummary {
     pub(crate) over: usize,
     /// Meshes that the method was asked for.
     pub(crate) asked: usize,
-    /// Meshes on which it reached the count.
-    pub(crate) reached: usize,
-    /// Meshes on which a result came out with another number of spheres.
-    pub(crate) missed: usize,
-    /// Meshes on which it failed.
-    pub(crate) failed: usize,
-    /// Meshes for which it does not do this.
-    pub(crate) unsupported: usize,
+    /// Meshes without such a result, by what became of them.
+    pub(crate) without: BTreeMap<Status, usize>,
     /// Means of [`COMPARED`] by their keys, and the number of meshes that each is over.
     means: BTreeMap<&'static str, (f64, usize)>,
     /// Hausdorff error in relation to the reference's.
     pub(crate) ratio: Option<Ratio>,
-    /// Arithmetic means of substrate, prepare and simplify seconds.
-    pub(crate) stages: Option<[f64; 3]>,
     /// Results with the Betti numbers of the solid, of those where both are known; over all meshes
     /// on which it reached the count.
     pub(crate) topology: (usize, usize),
@@ -202,20 +194,20 @@ fn at_count(
         }
         let mut reached = entries.clone();
         reached.retain(|entry| entry.comparable()); // of all meshes, not of the own set
-        let statuses = || entries.iter().map(|entry| entry.record.status);
-        let failed = statuses().filter(|status| status.is_failure()).count();
-        let unsupported = statuses().filter(|&status| status == Status::Unsupported).count();
+        let mut without = BTreeMap::new();
+        for entry in entries.iter().filter(|entry| !entry.comparable()) {
+            // Also where the status of an older build does not say so.
+            let status = entry.record.status;
+            let status = if status.is_ok() { Status::OtherCount } else { status };
+            *without.entry(status).or_default() += 1;
+        }
         rows.push(SeriesSummary {
             series,
             over: kept.len(),
             asked: entries.len(),
-            reached: reached.len(),
-            missed: entries.len() - reached.len() - failed - unsupported,
-            failed,
-            unsupported,
+            without,
             means,
             ratio: ratio(&entries, &yardstick),
-            stages: mean_stages(&kept),
             topology: topology(&reached),
         });
     }
@@ -230,15 +222,6 @@ fn ratio(entries: &[&Entry<'_>], reference: &[&Entry<'_>]) -> Option<Ratio> {
             .map(|e| HAUSDORFF.of(e.record).filter(|&error| e.comparable() && error > 0.0));
         Some(own? / others?)
     }))
-}
-
-/// Arithmetic means of the stages, which add up as stages must.
-fn mean_stages(entries: &[&Entry<'_>]) -> Option<[f64; 3]> {
-    let stages: Vec<Stages> =
-        entries.iter().filter_map(|entry| entry.record.simplify.seconds).collect();
-    let parts: [fn(&Stages) -> f64; 3] = [|s| s.substrate, |s| s.prepare, |s| s.simplify];
-    (!stages.is_empty())
-        .then(|| parts.map(|part| stages.iter().map(part).sum::<f64>() / stages.len() as f64))
 }
 
 /// Results with the solid's Betti numbers, and results where both are known.
@@ -339,7 +322,7 @@ pub(crate) fn native_table(
         .text("method", |(curve, _)| comparison.series[curve.series].as_str())
         .text("level", |(curve, point)| {
             match (point.level, header.native_axis(comparison.methods[curve.series])) {
-                (Target::Native(value), Some(axis)) => format!("{value} {axis}"),
+                (Target::Native(value), Some(axis)) => format!("{} {axis}", trimmed(value)),
                 (level, _) => level_label(level),
             }
         })
@@ -371,12 +354,12 @@ pub(crate) fn means_table(
     how: &str,
 ) -> Table {
     type Place<'s> = (&'s CountSummary, &'s SeriesSummary);
-    let rows: Vec<Place<'_>> = summaries
+    let places: Vec<Place<'_>> = summaries
         .iter()
         .flat_map(|summary| summary.rows.iter().map(move |row| (summary, row)))
         .collect();
     let yardstick = reference(comparison).map_or("reference", |series| &comparison.series[series]);
-    let mut rows = Table::of(&rows)
+    let mut rows = Table::of(&places)
         .number("spheres", |(summary, _)| grouped(summary.count as u64))
         .text("method", |(_, row)| comparison.series[row.series].as_str())
         .text("means over", |(_, row)| Cell::share((row.over, row.asked)))
@@ -386,23 +369,23 @@ pub(crate) fn means_table(
         .text("on", |(_, row)| {
             Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes")))
         });
+    let is_rising = |summary: &CountSummary, row| is_rising(summaries, summary, row);
+    let rising_note = places.iter().any(|(s, row)| is_rising(s, row)).then_some(RISING_NOTE);
     for metric in COMPARED {
-        rows = rows.number(metric.heading(), |(summary, row)| mean_cell(summary, row, metric));
-    }
-    for (stage, title) in ["substrate (s)", "prepare (s)", "simplify (s)"].into_iter().enumerate() {
-        rows = rows.number(title, move |(summary, row)| {
-            Cell::optional(row.stages.map(|stages| {
-                let seconds = significant(stages[stage], 3);
-                if row.over == summary.meshes { seconds } else { format!("({seconds})") }
-            }))
+        rows = rows.number(metric.heading(), |(summary, row)| {
+            let mut cell = mean_cell(summary, row, metric);
+            if metric.key == HAUSDORFF.key && is_rising(summary, row) {
+                cell.text.push_str(RISING);
+            }
+            cell
         });
     }
     rows = rows.text("topology right", |(_, row)| Cell::share(row.topology));
     rows = rows.text("without a result", |(_, row)| without_result(row));
     let notes = [
         how,
-        "Geometric means of errors and total time, arithmetic means of angles, shares, spikes \
-         and stages. Each method is averaged over one set of meshes of its own for all counts: \
+        "Geometric means of errors and total time, arithmetic means of angles, shares and \
+         spikes. Each method is averaged over one set of meshes of its own for all counts: \
          those on which it reached every count that it reached on enough of them. Means over \
          all meshes read beside each other; in parentheses are those over fewer, with their number \
          where some of the set have no such value, as an angle where there is no triangle. Across \
@@ -413,10 +396,23 @@ pub(crate) fn means_table(
     ];
     Table {
         caption: MEANS.to_owned(),
-        notes: notes.map(str::to_owned).into(),
+        notes: notes.into_iter().chain(rising_note).map(str::to_owned).collect(),
         grouped: true,
         ..rows.table
     }
+}
+
+/// Whether a method's mean error is above that of fewer spheres.
+pub(crate) fn is_rising(
+    summaries: &[CountSummary],
+    summary: &CountSummary,
+    row: &SeriesSummary,
+) -> bool {
+    let point = |count: usize, row: &SeriesSummary| Some((count as f64, row.mean(&HAUSDORFF)?));
+    let all = summaries.iter().flat_map(|s| s.rows.iter().map(|row| (s.count, row)));
+    let own = all.filter(|(_, other)| other.series == row.series);
+    let points: Vec<(f64, f64)> = own.filter_map(|(count, row)| point(count, row)).collect();
+    point(summary.count, row).is_some_and(|own| rises(own, &points))
 }
 
 /// A mean, in parentheses where it is not over all meshes.
@@ -436,14 +432,8 @@ fn mean_cell(summary: &CountSummary, row: &SeriesSummary, metric: &Metric) -> Ce
 }
 
 /// What became of the meshes that are in no mean.
-pub(crate) fn without_result(row: &SeriesSummary) -> String {
-    let mut parts = vec![];
-    for (count, what) in
-        [(row.failed, "failed"), (row.unsupported, "unsupported"), (row.missed, "other count")]
-    {
-        if count > 0 {
-            parts.push(format!("{count} {what}"));
-        }
-    }
+fn without_result(row: &SeriesSummary) -> String {
+    let parts = row.without.iter().map(|(status, count)| format!("{count} {status}"));
+    let parts: Vec<String> = parts.collect();
     if parts.is_empty() { "none".to_owned() } else { parts.join(", ") }
 }

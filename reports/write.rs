@@ -12,6 +12,7 @@ use crate::answers::{by_bound, equal_error_figure, equal_error_table, purpose_ta
 use crate::comparison::Comparison;
 use crate::header::Header;
 use crate::journal::{check_regular, replace_file};
+use crate::overview::overview_table;
 use crate::page::{MeshPart, MeshView, Page};
 use crate::pictures::{FOLDER, PictureStrip, VIEWS, strips};
 use crate::plots::{Figure, mean_figures, mesh_figures};
@@ -95,12 +96,12 @@ pub fn write_report(
     let shown = pictures.values().flat_map(|strip| [strip.file.clone(), strip.view_file()]);
     files.remove_stale(&shown.map(|file| dir.join(file)).collect::<Vec<_>>())?;
     if is_one {
-        // Means over one mesh are its results, and counts of meshes are ones.
+        // Means over one mesh are its results.
         means.retain(|table| table.caption != MEANS);
-        for table in means.iter_mut().chain(&mut equal_error) {
-            *table =
-                table.clone().without(&["means over", "kept on", "on", "topology right", "failed"]);
-        }
+    }
+    for table in means.iter_mut().chain(&mut equal_error) {
+        let known = table.clone().known();
+        *table = if is_one { known.of_one_mesh() } else { known };
     }
     let sections = [
         ("equal-error", "Equal error", equal_error),
@@ -110,6 +111,7 @@ pub fn write_report(
         header,
         comparison: &comparison,
         answers,
+        overview: overview_table(&comparison, &summaries, &header.methods),
         sections: sections.into_iter().filter(|section| !section.2.is_empty()).collect(),
         figures: &figures,
         meshes: &meshes,

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use medial_reports::{Record, Status};
+use medial_reports::{Record, Status, read_header};
 use serde_json::json;
 
 use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
@@ -291,7 +291,8 @@ fn finish(
         print_json(&object, &[]);
     } else {
         if ok > 0 {
-            print_line(&medial_reports::summary_text(records));
+            let methods = read_header(out).unwrap_or_default().methods;
+            print_line(&medial_reports::summary_text(records, &methods));
         }
         let given = match count(records, Status::External) {
             0 => String::new(),

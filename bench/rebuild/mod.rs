@@ -138,12 +138,13 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
             });
         }
     }
-    // Methods of this program are described as they are now; those of plug-ins that are not named
-    // this time stay as they were.
+    // Methods of this program are described as they are now, also those without a record, which the page names; those
+    // of plug-ins that are not named this time stay as they were.
     let ids: BTreeSet<&str> = records.iter().map(|r| r.simplify.method.as_str()).collect();
     // A merged or cleared store can name methods that have no record any more.
     header.methods.retain(|method| ids.contains(method.id.as_str()));
-    for entry in ids.into_iter().filter_map(|id| registry.entry(id)) {
+    let recorded = ids.into_iter().filter_map(|id| registry.entry(id));
+    for entry in registry.entries().iter().chain(recorded) {
         let note = MethodNote::new(entry.method().info(), entry.presentation());
         match header.methods.iter_mut().find(|known| known.id == entry.id()) {
             Some(known) => *known = note,

@@ -6,13 +6,13 @@ use std::path::Path;
 use medial::complex::MedialMesh;
 use medial::write_atomically;
 use medial_reports::render::{Background, Camera, ColourBy, Errors, Panel, Strip, strip};
-use medial_reports::{PictureStrip, Record, View3d, picture_strips};
+use medial_reports::{PictureStrip, Record, View3d, file_inside, picture_strips};
 
 use crate::study::source::{Input, Source};
 
-/// Pixels of a panel, and panels beside each other.
-const PANEL: [usize; 2] = [320, 260];
-const ACROSS: usize = 4;
+/// Pixels of a panel, and panels next to each other: a page of usual width shows them at about their size.
+const PANEL: [usize; 2] = [236, 192];
+const ACROSS: usize = 6;
 
 /// Draws the strips of some records into the folder of their report. What cannot be drawn, since an input is gone
 /// or changed, is left out, and the reason returned. What stands there already is not drawn again: its name tells what
@@ -42,7 +42,8 @@ fn draw_strip(dir: &Path, wanted: &PictureStrip, input: Option<&Input>) -> Resul
     let input = input.ok_or("its surface is not at hand as it was measured")?;
     let mut axes = Vec::new();
     for (artifact, _) in &wanted.panels {
-        let path = dir.join(artifact);
+        let path = file_inside(dir, artifact);
+        let path = path.ok_or_else(|| format!("{artifact} leads out of the folder"))?;
         let loaded = medial::complex::read(&path);
         axes.push(loaded.map_err(|error| format!("{}: {error}", path.display()))?.mesh);
     }

@@ -16,11 +16,12 @@ use flate2::write::GzEncoder;
 use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, level_label};
-use crate::header::{Header, RunNote, Running};
+use crate::header::{Header, MethodNote, RunNote, Running};
 use crate::metric::{BELOW_30, COMPARED, EPSILON, Metric, SPHERES_ONLY};
+use crate::pictures::most_telling;
 use crate::plots::{Figure, symbol};
 use crate::record::{Machine, Status};
-use crate::tables::{Table, warnings};
+use crate::tables::Table;
 use crate::text::{betti, counted, escape_html, grouped, printable};
 
 /// Everything that the page is made of.
@@ -29,6 +30,8 @@ pub(crate) struct Page<'a> {
     pub(crate) comparison: &'a Comparison<'a>,
     /// Which method for which purpose.
     pub(crate) answers: Option<Table>,
+    /// All methods at one number of spheres.
+    pub(crate) overview: Option<Table>,
     /// Folded sections of tables: id, title, tables.
     pub(crate) sections: Vec<(&'static str, &'static str, Vec<Table>)>,
     /// Figures over all meshes.
@@ -167,24 +170,15 @@ impl Page<'_> {
             .methods
             .iter()
             .filter(|note| comparison.methods.contains(&note.id.as_str()))
-            .map(|note| {
-                json!({
-                    "id": note.id, "title": note.title, "summary": note.summary, "home": note.home,
-                    "published": note.published.trim_end_matches('.'), "citation": note.citation,
-                })
-            });
+            .map(described);
         let runs = &header.runs;
         let command = runs.last().map(|run| &run.command).filter(|command| !command.is_empty());
-        let answers = self.answers.as_ref().map(|table| {
-            if !is_one {
-                return without_command(table);
-            }
-            // Medians, shares and counts of meshes say nothing about one mesh.
-            let mut table = table.clone().without(&["meshes", "better, equal, worse"]);
-            table.notes.clear(); // they explain medians
-            table.columns[2].title = "result".to_owned();
-            table
-        });
+        let pictured = (self.meshes.iter().enumerate())
+            .filter(|(_, mesh)| mesh.picture.is_some() || mesh.view.is_some())
+            .map(|(index, _)| index);
+        let absent = header.not_run(&comparison.methods);
+        let ids: Vec<&str> = absent.iter().map(|note| note.id.as_str()).collect();
+        let is_compared = comparison.measured() > 0 && !ids.is_empty();
         json!({
             "facts": self.facts(),
             "command": command,
@@ -197,10 +191,15 @@ impl Page<'_> {
             "levels": comparison.levels.iter().map(|&level| level_label(level)).collect::<Vec<_>>(),
             "metrics": metrics.collect::<Vec<_>>(),
             "meshes": (0..self.meshes.len()).map(|mesh| self.mesh(mesh)).collect::<Vec<_>>(),
-            "answers": answers,
+            "answers": self.answers.as_ref().map(without_command),
+            "overview": self.overview,
+            "leading": most_telling(comparison, pictured),
+            "not_run": is_compared.then(|| json!({
+                "methods": absent.iter().map(|note| described(note)).collect::<Vec<_>>(),
+                "command": header.command_with(&ids),
+            })),
             "figures": if is_one { vec![] } else { figures(self.figures) },
             "sections": sections,
-            "warnings": self.warnings(),
             "methods": methods.collect::<Vec<_>>(),
             "definitions": definitions(),
             "papers": (!comparison.entries.is_empty()).then_some(self.bibtex),
@@ -316,27 +315,6 @@ impl Page<'_> {
             ..rows.table
         })
     }
-
-    /// Every warning once, with the results that it came with.
-    fn warnings(&self) -> Vec<[String; 2]> {
-        let mut groups: Vec<(&str, Vec<String>)> = Vec::new();
-        for entry in &self.comparison.entries {
-            for warning in warnings(entry.record) {
-                let place = format!(
-                    "{} on {} ({})",
-                    self.comparison.series[entry.series],
-                    self.comparison.meshes[entry.mesh],
-                    level_label(entry.record.simplify.level)
-                );
-                // In the order of their first appearance, which no map keeps.
-                match groups.iter_mut().find(|(known, _)| *known == warning) {
-                    Some((_, places)) => places.push(place),
-                    None => groups.push((warning, vec![place])),
-                }
-            }
-        }
-        groups.iter().map(|(warning, places)| [(*warning).to_owned(), abridged(places)]).collect()
-    }
 }
 
 /// The page's head shows the command once for all tables: it is the first note of each.
@@ -344,6 +322,13 @@ fn without_command(table: &Table) -> Table {
     let mut table = table.clone();
     table.notes.drain(..table.notes.len().min(1));
     table
+}
+
+fn described(note: &MethodNote) -> Value {
+    json!({
+        "id": note.id, "title": note.title, "summary": note.summary, "home": note.home,
+        "published": note.published.trim_end_matches('.'), "citation": note.citation,
+    })
 }
 
 fn figures(figures: &[Figure]) -> Vec<Value> {

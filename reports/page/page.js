@@ -49,7 +49,8 @@ const WORDS = [
 ];
 const UNITS = "Lengths in % of the bounding-box diagonal of the input; seconds of wall clock, shared substrates included. " +
   "Arrows: which way is better. Bold: best for this mesh at this number of spheres, among results that reached it to " +
-  "within 2 %. results.csv holds every recorded number.";
+  "within 2 %. †: non-monotone, more than 5 % above the error of the same method with fewer spheres. results.csv holds every " +
+  "recorded number.";
 // Next to the page. The last two where there are means.
 const FILES = [
   ["results.jsonl", "the records, one JSON object on each line"],
@@ -91,11 +92,11 @@ const listOf = (pairs) =>
 
 const strip = (mesh, link) => {
   if (!mesh.picture) return null;
-  const words = `${mesh.name}: medial meshes, asked for one number of spheres, coloured by radius, with the surface as ` +
-    "glass; their Hausdorff errors in % of the diagonal. Below them the surface: red where the reconstruction reaches " +
-    "beyond it, blue where it falls short";
+  const words = `${mesh.name}: medial meshes of the same requested number of spheres (in parentheses: another number), the least ` +
+    "Hausdorff error (in % of the diagonal) first, coloured by radius. Below them the surface: red where the reconstruction reaches beyond it, blue " +
+    "where it falls short. Larger errors than the scale has are drawn in its last colour.";
   const image = make("img", { src: mesh.picture, alt: words });
-  return make("figure", { class: "strip" }, link ? make("a", { href: link }, image) : image,
+  return make("figure", { class: "strip" }, make("div", {}, link ? make("a", { href: link }, image) : image),
     make("figcaption", {}, words));
 };
 
@@ -133,11 +134,16 @@ const paste = (title, file, text) => {
   return make("div", { class: "paste" }, make("h3", {}, title), make("p", {}, button, " ", link, " ", said), pre);
 };
 
-const methodsOf = () => make("dl", {}, ...report.methods.flatMap(({ id, title, summary, home, published, citation }) => [
+const methodsOf = (methods) => make("dl", {}, ...methods.flatMap(({ id, title, summary, home, published, citation }) => [
   make("dt", {}, `${id}: ${title}`),
   make("dd", {}, [summary, home && `Best suited for: ${home}`, published && `Published level: ${published}.`]
     .filter(Boolean).join(" "), make("cite", {}, citation)),
 ]));
+
+// The methods without a result, and how to add them.
+const notRunOf = ({ methods, command }) => make("div", { class: "notrun" },
+  make("p", {}, make("strong", {}, "Not run: "), methods.map(({ id, home }) => home ? `${id} (${home.split(/[,;:.]/)[0].toLowerCase()})` : id).join(", "),
+    ". This command adds them to this page:"), code(command));
 
 // A fold whose content is made when it is first opened, or printed.
 const late = (details, build) => {
@@ -158,7 +164,7 @@ const meshFolds = (bulk) => report.meshes.map((mesh, index) => late(
 
 // Opens what the address names, with the folds around it.
 const openTarget = () => {
-  let id = location.hash.slice(1);
+  let id = location.hash.slice(1).split("?")[0];
   try {
     id = decodeURIComponent(id);
   } catch {
@@ -166,7 +172,10 @@ const openTarget = () => {
   }
   const target = document.getElementById(id);
   for (let around = target; around; around = around.parentElement) {
-    if (around.localName === "details") around.open = true;
+    if (around.localName === "details") {
+      around.open = true;
+      around.fill?.();
+    }
   }
   target?.scrollIntoView();
 };
@@ -177,16 +186,10 @@ const start = async () => {
   await evaluated("plot");
   const main = document.querySelector("main");
   document.getElementById("facts").append(...report.facts.map((fact) => make("li", {}, fact)));
-  document.getElementById("how").append(...[
-    report.command && code(report.command),
-    report.earlier.length && fold(null, `${counted(report.earlier.length, "earlier run", "earlier runs")} that added records`,
-      make("ul", {}, ...report.earlier.map((line) => make("li", {}, make("code", {}, line))))),
-    report.study && fold(null, "Study file of the last run", code(report.study)),
-  ].filter(Boolean));
+  if (report.command) document.getElementById("how").append(code(report.command));
 
   const isOne = report.meshes.length === 1;
   const [first] = report.meshes;
-  const shown = report.meshes.findIndex((mesh) => mesh.picture || mesh.view);
   const overview = isOne ? bulk.figures[0] ?? [] : report.figures;
   const curves = overview.filter((figure) => figure.leading);
   const others = overview.filter((figure) => !figure.leading);
@@ -201,25 +204,33 @@ const start = async () => {
   if (report.notices.length) {
     parts.push(make("ul", { class: "notice" }, ...report.notices.map((text) => make("li", {}, text))));
   }
-  if (report.answers) {
-    parts.push(section("answers", "Which method?", tableOf(report.answers), ...report.answers.notes.map(note)));
+  if (report.answers || report.not_run) {
+    const table = report.answers ?? { columns: [], rows: [], notes: [] };
+    parts.push(section("answers", "Which method?", report.answers && tableOf(table), report.not_run && notRunOf(report.not_run),
+      table.notes.length ? fold(null, "How these are decided", ...table.notes.map(note)) : null));
   }
   if (isOne) {
     const inner = meshParts(0, true, []).filter(Boolean);
     if (inner.length) parts.push(make("section", { id: `mesh-${first.stem}` }, make("h2", {}, "Pictures"), ...inner));
-  } else if (shown >= 0) {
+  } else if (report.leading !== null) {
+    const mesh = report.meshes[report.leading];
     const way = make("a", { href: "#meshes" }, "Pictures, 3D views and curves of each mesh");
-    const mesh = report.meshes[shown];
-    parts.push(section("pictures", "Pictures", strip(mesh, `#mesh-${mesh.stem}`), mesh.view && viewOf(mesh.view), make("p", {}, way)));
+    const why = `Shown is ${mesh.name}: of the meshes on which most methods ran, the one on which their errors differ most. `;
+    parts.push(section("pictures", "Pictures", strip(mesh, `#mesh-${mesh.stem}`), mesh.view && viewOf(mesh.view), make("p", {}, why, way)));
   }
   if (curves.length) parts.push(section("curves", "Error against spheres and time", plotsOf(curves)));
-  if (bulk.rows) parts.push(resultsOf(bulk));
-  else if (report.too_many) parts.push(section("results", "Results", make("p", {}, report.too_many)));
-  const folds = report.sections.map(({ id, title, tables }) => fold(id, title, ...tables.flatMap(captioned)));
+  if (report.overview) {
+    const { caption, notes } = report.overview;
+    parts.push(section("overview", `All methods: ${caption}`, tableOf(report.overview), ...notes.map(note)));
+  }
+  const folds = [];
+  if (bulk.rows) folds.push(late(fold("results", "All results"), () => resultsOf(bulk)));
+  else if (report.too_many) folds.push(fold("results", "All results", make("p", {}, report.too_many)));
+  folds.push(...report.sections.map(({ id, title, tables }) => fold(id, title, ...tables.flatMap(captioned))));
   if (!isOne && report.meshes.length) folds.push(fold("meshes", "Each mesh: pictures, 3D, curves", ...meshFolds(bulk)));
   if (others.length) folds.push(late(fold("plots", "More plots"), () => [plotsOf(others)]));
-  if (report.warnings.length) folds.push(fold("warnings", "Warnings", listOf(report.warnings)));
-  if (report.methods.length) folds.push(fold("methods", "Methods", methodsOf()));
+  if (report.methods.length) folds.push(fold("methods", "Methods", methodsOf(report.methods)));
+  if (report.not_run) folds.push(fold("not-run", "Methods that were not run", methodsOf(report.not_run.methods), code(report.not_run.command)));
   folds.push(fold("definitions", "Definitions", listOf([...report.definitions, ...WORDS])));
   if (report.papers) {
     const about = "plots/ holds all plots as SVG, lettered in Helvetica, Arial or another sans-serif; tables/ holds all " +
@@ -230,8 +241,15 @@ const start = async () => {
   }
   folds.push(fold("files", "Files", make("ul", {}, ...FILES.slice(0, report.sections.some(({ id }) => id !== "failures") ? 4 : 2).map(([path, text]) =>
     make("li", {}, make("a", { href: `./${path}` }, path), `: ${text}`)))));
+  const runs = [
+    report.earlier.length && make("h3", {}, `${counted(report.earlier.length, "earlier run", "earlier runs")} that added records`),
+    report.earlier.length && make("ul", {}, ...report.earlier.map((line) => make("li", {}, make("code", {}, line)))),
+    report.study && make("h3", {}, "Study file of the last run"),
+    report.study && code(report.study),
+  ].filter(Boolean);
+  if (runs.length) folds.push(fold("runs", "Runs and study file", ...runs));
   main.append(...parts, make("section", { id: "more" }, ...folds));
-  const named = [...main.querySelectorAll(":scope > section > h2, :scope > section > details.fold > summary")];
+  const named = [...main.querySelectorAll(":scope > section > h2, #more > details.fold > summary")];
   document.querySelector("nav").append(...named.map((head) =>
     make("a", { href: `#${head.parentElement.id}` }, head.textContent)));
   openTarget();

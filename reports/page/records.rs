@@ -24,7 +24,7 @@ pub(super) fn all_columns(comparison: &Comparison<'_>) -> BTreeMap<String, Vec<V
             Some((mesh, best)) if *mesh == entry.mesh => best,
             slot => &mut slot.insert((entry.mesh, Best::of_mesh(comparison, entry.mesh))).1,
         };
-        for (path, value) in row(entry, best) {
+        for (path, value) in row(comparison, entry, best) {
             let empty = || vec![Value::Null; comparison.entries.len()];
             columns.entry(path).or_insert_with(empty)[index] = value;
         }
@@ -32,7 +32,7 @@ pub(super) fn all_columns(comparison: &Comparison<'_>) -> BTreeMap<String, Vec<V
     columns
 }
 
-fn row(entry: &Entry<'_>, best: &Best) -> Vec<(String, Value)> {
+fn row(comparison: &Comparison<'_>, entry: &Entry<'_>, best: &Best) -> Vec<(String, Value)> {
     let record = entry.record;
     let mut row = flatten(record);
     // The seconds of a single repetition are those of the record.
@@ -60,6 +60,7 @@ fn row(entry: &Entry<'_>, best: &Best) -> Vec<(String, Value)> {
         ("status", json!(record.status.to_string())),
         ("spheres", json!(reached(record))),
         ("topology", json!(topology_verdict(entry))),
+        ("rising", json!(comparison.is_rising(entry).then_some(1))),
         ("remark", json!(remark(entry))),
         ("link", json!(record.artifact.as_deref().and_then(local_link))),
         ("warnings", if warnings.is_empty() { Value::Null } else { json!(warnings) }),

@@ -9,7 +9,8 @@ const resultsOf = (bulk) => {
     if (!column) return () => null;
     return (row) => column[row];
   };
-  const table = { mesh: columnOf("table/mesh"), series: columnOf("table/series"), best: columnOf("table/best") };
+  const table = { mesh: columnOf("table/mesh"), series: columnOf("table/series"), best: columnOf("table/best"),
+    rising: columnOf("table/rising") };
   const texts = {};
   for (const key of ["asked", "status", "remark", "link", "topology", "repeat", "warnings"]) texts[key] = columnOf(`table/${key}`);
   texts.mesh = (row) => report.meshes[table.mesh(row)].name;
@@ -128,7 +129,8 @@ const resultsOf = (bulk) => {
     }
     if (!value) return make("td", {}, shown);
     const best = bit && table.best(row) & bit;
-    return make("td", { class: "num", "data-v": value(row) }, best ? make("strong", {}, shown) : shown);
+    const mark = key === "hausdorff" && table.rising(row) ? " †" : null;
+    return make("td", { class: "num", "data-v": value(row) }, best ? make("strong", {}, shown) : shown, mark);
   };
   const opened = new Map();
   const rowOf = (row) => {
@@ -195,7 +197,7 @@ const resultsOf = (bulk) => {
     return make("tr", { class: "detail" }, make("td", { colspan: columns.length }, known));
   };
   const valueOf = (value) => {
-    if (typeof value === "number") return String(Number.isInteger(value) ? value : Number(value.toPrecision(6)));
+    if (typeof value === "number") return String(Number.isInteger(value) ? value : Number(value.toPrecision(4)));
     if (!Array.isArray(value)) return typeof value === "object" ? JSON.stringify(value) : String(value);
     if (typeof value[0] !== "object") return value.join(typeof value[0] === "string" ? "\n" : ", ");
     const names = Object.keys(value[0]).map((name) => ({ title: name.replaceAll("_", " "), number: true }));
@@ -276,7 +278,7 @@ const resultsOf = (bulk) => {
   window.addEventListener("hashchange", read);
   chooseColumns();
   show();
-  // The address may name rows: read once the section stands in the document.
+  // The address may name rows: read once the table stands in the document.
   queueMicrotask(read);
-  return section("results", "Results", form, box, note(UNITS));
+  return [form, box, note(UNITS)];
 };

@@ -288,7 +288,7 @@ const viewOf = (() => {
       const { largest_error: end, radii, diagonal } = this.view;
       const [least, most] = radii.map((radius) => percent((100 * radius) / diagonal));
       this.caption.textContent = {
-        errors: `red: the reconstruction reaches beyond, blue: it falls short; full colour from ${percent(end)} of the diagonal`,
+        errors: `red: the reconstruction reaches beyond, blue: it falls short; errors above ${percent(end)} of the diagonal have the last colour`,
         surface: "the input",
       }[kind] ?? `colour: radius, ${least} to ${most} of the diagonal`;
       this.of.disabled = kind === "surface";

@@ -8,7 +8,7 @@ mod svg;
 
 use serde_json::{Value, json};
 
-use crate::comparison::{Comparison, reached};
+use crate::comparison::{Comparison, reached, rises};
 use crate::metric::{HAUSDORFF, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS};
 use crate::record::Record;
 use crate::summary::{CountSummary, NativeCurve};
@@ -58,6 +58,8 @@ pub(crate) struct Point {
     pub(crate) compared: bool,
     /// Text next to the point.
     pub(crate) tag: Option<String>,
+    /// Whether it is an error above one of fewer spheres.
+    pub(crate) rising: bool,
 }
 
 impl Point {
@@ -81,7 +83,8 @@ impl Figure {
             let points = curve.points.iter().enumerate().map(|(k, point)| {
                 let is_front = u8::from(front.contains(&(index, k)));
                 let [x, y] = [point.x, point.y].map(rounded);
-                json!([x, y, point.n, point.spheres.map(rounded), is_front, point.tag])
+                let is_rising = u8::from(point.rising);
+                json!([x, y, point.n, point.spheres.map(rounded), is_front, point.tag, is_rising])
             });
             json!({
                 "series": curve.series, "label": curve.label, "name": curve.name, "of": curve.of,
@@ -139,40 +142,55 @@ impl Kind {
         self.0 == "time"
     }
 
+    /// Whether the metric is an error, which spans orders of magnitude and of which less is better at any cost.
+    fn is_error(&self) -> bool {
+        !matches!(self.0, "angles" | "spikes")
+    }
+
     fn figure(&self, stem: &str, of: &str, curves: Vec<Curve>) -> Option<Figure> {
         let Self(name, title, _) = self;
-        // Errors span orders of magnitude, and less of them is better at any cost.
-        let (y, scale) = match *name {
-            "angles" => ("mean smallest angle (degrees)", Scale::Linear),
-            "spikes" => ("spikes", Scale::Linear),
-            "mean" => ("mean error (% of diagonal)", Scale::Log),
-            _ => ("Hausdorff error (% of diagonal)", Scale::Log),
+        let y = match *name {
+            "angles" => "mean smallest angle (degrees)",
+            "spikes" => "spikes",
+            "mean" => "mean error (% of diagonal)",
+            _ => "Hausdorff error (% of diagonal)",
         };
+        let scale = if self.is_error() { Scale::Log } else { Scale::Linear };
         let figure = Figure {
             stem: format!("{stem}-{name}"),
             title: format!("{of}: {title}"),
             x: if self.is_over_time() { "time (s)".to_owned() } else { "spheres".to_owned() },
             y: (y.to_owned(), scale),
             curves,
-            front: scale == Scale::Log,
+            front: self.is_error(),
             leading: matches!(*name, "hausdorff" | "time"),
         };
         figure.with_points()
     }
 
     /// A curve of results or means: spheres, seconds and y of each, the meshes behind it, and of how many. Those over
-    /// all meshes are compared. Over time both ends are tagged with their number of spheres, which no axis shows.
+    /// all meshes are compared. Over time both ends are tagged with their number of spheres, which no axis shows. Dashes
+    /// are at native levels, where an error that rises has no mark.
     fn curve(
         &self,
         series: usize,
         (name, of): (&str, &str),
+        dashed: bool,
         points: impl IntoIterator<Item = (f64, Option<f64>, Option<f64>, [usize; 2])>,
     ) -> Curve {
+        let points: Vec<_> = points.into_iter().collect();
+        let errors: Vec<(f64, f64)> = (points.iter())
+            .filter_map(|&(spheres, _, y, _)| {
+                Some((spheres, y.filter(|_| self.is_error() && !dashed)?))
+            })
+            .collect();
         let mut points: Vec<Point> = (points.into_iter())
             .filter_map(|(spheres, seconds, y, [n, all])| {
+                let rising = rises((spheres, y?), &errors);
                 let (x, spheres) =
                     if self.is_over_time() { (seconds?, Some(spheres)) } else { (spheres, None) };
-                Some(Point { x, y: y?, n: Some(n), spheres, compared: n == all, tag: None })
+                let compared = n == all;
+                Some(Point { x, y: y?, n: Some(n), spheres, compared, tag: None, rising })
             })
             .collect();
         for k in [0, points.len().saturating_sub(1)] {
@@ -181,7 +199,7 @@ impl Kind {
             }
         }
         let [label, name, of] = [name, name, of].map(str::to_owned);
-        Curve { series, label, name, of, points, dashed: false }
+        Curve { series, label, name, of, points, dashed }
     }
 }
 
@@ -202,7 +220,7 @@ pub(crate) fn mesh_figures(comparison: &Comparison<'_>, mesh: usize, stem: &str)
                 Some((reached(record)? as f64, TOTAL_SECONDS.of(record), kind.2.of(record), [1, 1]))
             });
             let names = (&*comparison.series[series], &*comparison.meshes[mesh]);
-            let mut curve = Curve { dashed, ..kind.curve(series, names, points) };
+            let mut curve = kind.curve(series, names, dashed, points);
             // One row in the legend for both.
             if dashed && curves.last().is_some_and(|solid| !solid.points.is_empty()) {
                 curve.label.clear();
@@ -236,7 +254,7 @@ pub(crate) fn mean_figures(
                 };
                 (point.spheres, None, y, [native.over, comparison.meshes.len()])
             });
-            let mut curve = Curve { dashed: true, ..kind.curve(series, (&name, "mean"), points) };
+            let mut curve = kind.curve(series, (&name, "mean"), true, points);
             if !curves[series].points.is_empty() {
                 curve.label.clear();
             }
@@ -266,7 +284,7 @@ fn mean_curve(
         let of = [over, summary.meshes];
         Some((summary.count as f64, row.mean(&TOTAL_SECONDS), Some(y), of))
     });
-    let curve = kind.curve(series, (name, "mean"), points);
+    let curve = kind.curve(series, (name, "mean"), false, points);
     Curve { label, ..curve }
 }
 

@@ -60,6 +60,7 @@ fn colour(series: usize) -> RGBColor {
 const FONTS: &str = "Helvetica, Arial, sans-serif";
 
 const FRONT: &str = "not dominated";
+const RISING: &str = "non-monotone";
 
 /// Any error of plotters: only writing can fail, and a text takes everything.
 type Drawn = Result<(), Box<dyn Error>>;
@@ -79,12 +80,16 @@ impl Figure {
         let x = Axis::fit(Scale::Log, points.iter().map(|point| point.x));
         let y = Axis::fit(self.y.1, points.iter().map(|point| point.y));
         let (Some(x), Some(y)) = (x, y) else { return Ok(None) };
-        let rows = self.curves.iter().filter(|curve| !curve.label.is_empty()).count() + 1;
+        let rows = self.curves.iter().filter(|curve| !curve.label.is_empty()).count() + 2;
         let size = (WIDTH as u32, HEIGHT.max(rows as i32 * LEGEND_ROW + 120) as u32);
         let mut svg = String::new();
         self.draw(x, y, &SVGBackend::with_string(&mut svg, size).into_drawing_area())
             .map_err(|error| ReportError::content("a plot", format!("plot: {error}")))?;
         Ok(Some(svg))
+    }
+
+    fn is_rising(&self) -> bool {
+        self.curves.iter().any(|curve| curve.points.iter().any(|point| point.rising))
     }
 
     fn draw(&self, x: Axis, y: Axis, area: &Area<'_>) -> Drawn {
@@ -133,6 +138,9 @@ impl Figure {
                 // Relative to the plot, without its margins.
                 let at = (left - inner.get_base_pixel().0, top - inner.get_base_pixel().1);
                 draw_marker(&inner, curve.series, at)?; // above its own line
+                if point.rising {
+                    inner.draw(&ring(at))?;
+                }
                 let free = point.tag.as_ref().and_then(|tag| free_place(at, tag, &mut taken));
                 if let (Some(tag), Some(at)) = (&point.tag, free) {
                     let text = Text::new(tag.clone(), at, font(20, HPos::Left));
@@ -170,9 +178,19 @@ impl Figure {
         if has_front {
             area.draw(&PathElement::new(vec![(0, y), (48, y)], INK.stroke_width(2)))?;
             area.draw(&Text::new(FRONT, (62, y), font(24, HPos::Left)))?;
+            y += LEGEND_ROW;
+        }
+        if self.is_rising() {
+            area.draw(&ring((24, y)))?;
+            area.draw(&Text::new(RISING, (62, y), font(24, HPos::Left)))?;
         }
         Ok(())
     }
+}
+
+/// What marks an error that rises with the number of spheres, around a marker.
+fn ring(at: (i32, i32)) -> Circle<(i32, i32), i32> {
+    Circle::new(at, 15, INK.stroke_width(2))
 }
 
 fn legend_text(curve: &Curve) -> String {

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::comparison::{Comparison, Entry, level_label, reached};
-use crate::metric::{COMPARED, Metric};
+use crate::comparison::{Comparison, Entry, RISING, RISING_NOTE, level_label, reached};
+use crate::metric::{COMPARED, HAUSDORFF, Metric};
 use crate::summary::pick;
 use crate::tables::{Cell, Table};
 use crate::text::{betti, grouped, printable};
@@ -79,7 +79,13 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
     for metric in COMPARED {
         rows = rows.number(metric.heading(), |entry| match metric.of(entry.record) {
             Some(value) => {
-                Cell { text: metric.format(value), best: best.is_best(entry, metric, value) }
+                let mark = if metric.key == HAUSDORFF.key && comparison.is_rising(entry) {
+                    RISING
+                } else {
+                    ""
+                };
+                let text = metric.format(value) + mark;
+                Cell { text, best: best.is_best(entry, metric, value) }
             }
             None => Cell::optional(None),
         });
@@ -102,6 +108,9 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
         ));
     }
     notes.push(UNITS.to_owned());
+    if entries.iter().any(|entry| comparison.is_rising(entry)) {
+        notes.push(RISING_NOTE.to_owned());
+    }
     Table {
         caption: format!("{}: every method at every level", comparison.meshes[mesh]),
         notes,

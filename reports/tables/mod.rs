@@ -32,6 +32,37 @@ impl Table {
         Rows { items, table: Self { rows, ..Self::default() } }
     }
 
+    /// The table without rows whose numbers are all unknown, but for that of the first column, and without columns of
+    /// which no cell is known.
+    pub(crate) fn known(mut self) -> Self {
+        let numbers: Vec<bool> = self.columns.iter().map(|column| column.number).collect();
+        self.rows.retain(|row| {
+            let mut cells = row.iter().zip(&numbers).skip(1).filter(|(_, is_number)| **is_number);
+            cells.any(|(cell, _)| cell.text != UNKNOWN)
+        });
+        let rows = &self.rows;
+        let unknown: Vec<String> = (self.columns.iter().enumerate())
+            .filter(|(k, _)| rows.iter().all(|row| row[*k].text == UNKNOWN))
+            .map(|(_, column)| column.title.clone())
+            .collect();
+        self.without(&unknown.iter().map(String::as_str).collect::<Vec<_>>())
+    }
+
+    /// The table of one mesh, without counts of meshes and remarks on medians.
+    pub(crate) fn of_one_mesh(mut self) -> Self {
+        self.notes.truncate(1); // the command
+        for (k, column) in self.columns.iter().enumerate() {
+            if column.title.starts_with("topology") {
+                let verdicts = [("1 of 1", "yes"), ("0 of 1", "no")];
+                for cell in self.rows.iter_mut().map(|row| &mut row[k]) {
+                    let verdict = verdicts.iter().find(|(share, _)| *share == cell.text);
+                    *cell = verdict.map_or(cell.clone(), |(_, verdict)| (*verdict).into());
+                }
+            }
+        }
+        self.without(&["means over", "meshes", "kept on", "on", "failed"])
+    }
+
     /// The table without some columns, by their titles.
     pub(crate) fn without(mut self, titles: &[&str]) -> Self {
         // From the right, so that places to the left stay valid.
@@ -101,6 +132,9 @@ impl Column {
     }
 }
 
+/// What stands where there is nothing.
+const UNKNOWN: &str = "–";
+
 /// One cell.
 #[derive(Clone, Default)]
 pub(crate) struct Cell {
@@ -118,7 +152,7 @@ impl<T: Into<String>> From<T> for Cell {
 impl Cell {
     /// A dash where there is nothing.
     pub(crate) fn optional(text: Option<String>) -> Self {
-        text.unwrap_or_else(|| "–".to_owned()).into()
+        text.unwrap_or_else(|| UNKNOWN.to_owned()).into()
     }
 
     /// `3 of 4`; a dash of none.
@@ -249,7 +283,7 @@ fn align(table: &Table, column: usize) -> &'static str {
 }
 
 /// Characters that LaTeX spells.
-const SPELLED: [(char, &str); 27] = [
+const SPELLED: [(char, &str); 28] = [
     ('\\', "\\textbackslash{}"),
     ('~', "\\textasciitilde{}"),
     ('^', "\\textasciicircum{}"),
@@ -267,6 +301,7 @@ const SPELLED: [(char, &str); 27] = [
     ('…', "\\ldots{}"),
     ('÷', "$\\div$"),
     ('×', "$\\times$"),
+    ('†', "$\\dagger$"),
     ('±', "$\\pm$"),
     ('·', "$\\cdot$"),
     ('≤', "$\\le$"),

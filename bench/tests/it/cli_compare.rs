@@ -75,9 +75,9 @@ fn own_levels_bounds_chains_and_the_start_are_rows() {
     }
 }
 
-/// The summary without its numbers.
+/// The table of the summary without its numbers.
 fn heads(stdout: &str) -> String {
-    let lines = stdout.lines().take_while(|text| !text.contains("page:"));
+    let lines = stdout.lines().take_while(|text| !text.contains("in % of the diagonal"));
     let heads = lines.map(|line| line.split_whitespace().next().unwrap_or_default());
     heads.collect::<Vec<_>>().join("\n")
 }

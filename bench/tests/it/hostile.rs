@@ -1,7 +1,12 @@
 //! The command against files and arguments as they come from elsewhere.
 
 use std::fs;
+#[cfg(unix)]
+use std::path::Path;
 use std::process::{Command, Stdio};
+
+#[cfg(unix)]
+use serde_json::Value;
 
 use crate::command::{MEDIAL, done, folder, json, refused, run};
 
@@ -187,4 +192,35 @@ fn a_surface_with_a_hole_and_a_stray_part_is_repaired() {
     done(&["info", &mended]);
     let (code, object) = repair(&["--fill-holes", "--components", "largest"]);
     assert_eq!((code, &object["components"]), (0, &1.into()), "{object}");
+}
+
+/// The artifact of a record may name any file of the machine: a report neither shows nor copies it.
+#[cfg(unix)]
+#[test]
+fn artifacts_that_lead_out_of_a_store_are_not_followed() {
+    let at = folder();
+    let (store, merged, results) = (at("store"), at("merged"), at("store/results.jsonl"));
+    let words = ["compare", "builtin:sphere:8", "--methods", "qmat", "--spheres", "20"];
+    done(&[&words[..], &["--counts-only", "--out", &store]].concat());
+    let text = fs::read_to_string(&results).expect("results");
+    let mut record: Value =
+        serde_json::from_str(text.lines().next().expect("a line")).expect("JSON");
+    let inside = record["artifact"].as_str().expect("a medial mesh").to_owned();
+    fs::copy(at(&format!("store/{inside}")), at("outside.ma")).expect("copied");
+    std::os::unix::fs::symlink(at("outside.ma"), at("store/axes/link.ma")).expect("a link");
+    for artifact in ["../outside.ma", &at("outside.ma"), "axes/link.ma"] {
+        record["artifact"] = artifact.into();
+        fs::write(&results, format!("{record}\n")).expect("written");
+        let (code, object) = json(&["report", &store]);
+        let warnings = object["warnings"].to_string();
+        assert_eq!(code, 0, "{object}");
+        assert!(warnings.contains(&format!("{artifact} leads out of the folder")), "{warnings}");
+        for folder in ["store/pictures", "store/views"] {
+            let files = fs::read_dir(at(folder)).map_or(0, Iterator::count);
+            assert_eq!(files, 0, "{artifact}: {folder}");
+        }
+        done(&["report", &store, "--out", &merged]);
+        assert!(!Path::new(&merged).join("axes").exists(), "{artifact} was copied");
+        fs::remove_dir_all(&merged).expect("a store");
+    }
 }

@@ -5,7 +5,10 @@ use std::fs;
 use std::path::Path;
 
 use super::common::{SHAPES, comparison, documents, failed, header, ok};
-use medial_reports::{Record, Status, read_header, summary_text, write_report};
+use medial_reports::{
+    Header, Record, Running, Status, file_inside, picture_strips, read_header, summary_text,
+    write_report,
+};
 
 const METHODS: [&str; 3] = ["qmat", "angle", "lambda"];
 const COUNTS: [usize; 3] = [500, 200, 100];
@@ -290,8 +293,159 @@ fn nothing_measured_is_said() {
         assert!(alert(records).unwrap().starts_with("Nothing was measured"));
     }
     assert_eq!(alert(&[ok("bear", "qmat", 100, 0, 0)]), None);
-    assert_eq!(summary_text(&[]), "");
-    assert!(summary_text(&records).contains("0/1"), "{}", summary_text(&records));
+    assert_eq!(summary_text(&[], &[]), "");
+    assert_eq!(summary_text(&records, &[]), "");
+}
+
+/// Sets the Hausdorff error, a fraction of the diagonal.
+fn with_error(mut record: Record, error: f64) -> Record {
+    record.evaluate.as_mut().unwrap().distances.hausdorff = error;
+    record
+}
+
+#[test]
+fn a_comparison_ends_with_one_table_of_100_columns() {
+    let mut records = comparison(&SHAPES[..2], &METHODS, &COUNTS);
+    for mesh in &SHAPES[..2] {
+        records.push(failed(mesh, "sat", 100, Status::OtherCount, "200 spheres"));
+        records.push(failed(mesh, "aof", 100, Status::TimedOut, "no result within 300 s"));
+        records.push(with_error(ok(mesh, &"long ".repeat(20), 100, 0, 0), 0.001));
+        records.push(with_error(ok(mesh, "angle", 100, 0, 0), 0.002));
+        records.push(with_error(ok(mesh, "angle", 200, 0, 0), 0.003));
+    }
+    let text = summary_text(&records, &header(&METHODS).methods);
+    let lines: Vec<&str> = text.lines().collect();
+    assert!(lines.iter().all(|line| line.chars().count() <= 100), "{text}");
+    assert_eq!(lines[0], "100 spheres, 2 meshes");
+    // A title, the heads, a line for each method with a result, the least error first.
+    let methods = lines[2..6].iter().map(|line| line.split(' ').next().unwrap());
+    assert_eq!(methods.collect::<Vec<_>>(), ["long", "angle", "lambda", "qmat"], "{text}");
+    assert!(lines[3].contains(" 0.200 ") && lines[3].ends_with("  few spheres"), "{text}");
+    assert!(text.contains("No result at this count: sat: other_count; aof: timed_out."), "{text}");
+    assert_eq!(text.matches("spheres, 2 meshes").count(), 1, "one count: {text}");
+}
+
+#[test]
+fn neither_the_start_nor_an_error_above_5_percent_answers_a_question() {
+    let mut records = vec![];
+    for (shape, mesh) in SHAPES[..2].iter().enumerate() {
+        records.push(with_error(ok(mesh, "initial", 100, shape, 0), 0.001));
+        records.push(with_error(ok(mesh, "sat", 100, shape, 0), 0.226));
+        let mut wrong = with_error(ok(mesh, "qmat", 100, shape, 0), 0.009);
+        wrong.evaluate.as_mut().unwrap().betti = [1, 9, 9];
+        records.push(wrong);
+    }
+    let files = report_of(&records);
+    let table = text(&files, "tables/overview-purpose.md");
+    assert!(table.contains("| lowest error at 100 spheres | **qmat** | 0.900 % |"), "{table}");
+    assert!(table.contains("| fastest within 1 % error | **qmat** |"), "{table}");
+    assert!(table.contains("| topology right everywhere, lowest error at 100 spheres | none |"));
+    assert!(!table.contains("| **initial**") && !table.contains("sat |"), "{table}");
+}
+
+#[test]
+fn an_error_that_rises_with_the_count_is_marked() {
+    let errors = [(50, 0.02), (100, 0.01), (200, 0.0104), (500, 0.0106)];
+    let curve = errors.map(|(count, error)| with_error(ok("bear", "qmat", count, 0, 0), error));
+    let files = report_of(&curve);
+    for name in ["tables/mesh-bear.md", "tables/summary.md"] {
+        let table = text(&files, name);
+        let marked: Vec<&str> = table.lines().filter(|line| line.contains(" †")).collect();
+        assert_eq!(marked.len(), 1, "{name}: {table}");
+        assert!(marked[0].starts_with("| 500 |") && marked[0].contains("1.06 †"), "{name}");
+        assert!(table.contains("†: non-monotone"), "{name}");
+    }
+    assert!(text(&files, "tables/summary.tex").contains("$\\dagger$"));
+    let [_, bulk] = documents(text(&files, "index.html"));
+    let rising = bulk["columns"]["table/rising"].as_array().unwrap();
+    assert_eq!(rising.iter().filter(|mark| !mark.is_null()).count(), 1);
+    let points = bulk["figures"][0][0]["curves"][0]["points"].as_array().unwrap();
+    let marks: Vec<_> = points.iter().map(|point| (point[0].as_f64(), &point[6] == 1)).collect();
+    assert_eq!(marks.iter().filter(|mark| mark.1).collect::<Vec<_>>(), [&(Some(500.0), true)]);
+    assert!(text(&files, "plots/mesh-bear-hausdorff.svg").contains("non-monotone"));
+    let steady = report_of(&curve[..3]);
+    assert!(!text(&steady, "plots/mesh-bear-hausdorff.svg").contains("non-monotone"));
+    assert!(!text(&steady, "tables/mesh-bear.md").contains('†'));
+}
+
+#[test]
+fn methods_that_did_not_run_are_named_with_a_command_and_missing_ones_are_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let records = comparison(&SHAPES[..2], &["qmat"], &COUNTS);
+    let page = |head: &Header| {
+        write_report(folder.path(), &records, head).unwrap();
+        let [page, _] = documents(&fs::read_to_string(folder.path().join("index.html")).unwrap());
+        (page["not_run"].clone(), page["running"].clone())
+    };
+    let ids = |not_run: &serde_json::Value| -> Vec<String> {
+        let methods = not_run["methods"].as_array().unwrap().iter();
+        methods.map(|method| method["id"].as_str().unwrap().to_owned()).collect()
+    };
+    let mut head = header(&["qmat", "angle", "tight"]);
+    let (not_run, running) = page(&head);
+    assert_eq!(ids(&not_run), ["angle", "tight"]);
+    let command = "medial compare --spheres 1000,500,200,100 --methods angle,tight";
+    assert_eq!(not_run["command"], command);
+    assert!(running.is_null());
+    head.running = Some(Running { done: 1, total: 2, missing: vec!["angle".to_owned()] });
+    let (not_run, running) = page(&head);
+    assert_eq!(ids(&not_run), ["tight"]);
+    assert_eq!(running, "1 of 2 methods done; missing: angle.");
+    // Headers of older reports have no such field.
+    let old = fs::read_to_string(folder.path().join("header.json")).unwrap();
+    let mut old: serde_json::Value = serde_json::from_str(&old).unwrap();
+    old.as_object_mut().unwrap().remove("running");
+    fs::write(folder.path().join("header.json"), old.to_string()).unwrap();
+    assert_eq!(read_header(folder.path()).unwrap().running, None);
+    assert!(page(&header(&["qmat"])).0.is_null(), "all methods ran");
+}
+
+#[test]
+fn captions_have_the_recorded_error_and_the_most_telling_mesh_comes_first() {
+    let mut records = vec![];
+    // Methods differ most on the third one, which one of them did not run on.
+    for (mesh, errors) in [("a", [0.01, 0.012]), ("b", [0.04, 0.01]), ("c", [0.2, 0.001])] {
+        for (method, error) in METHODS.iter().zip(errors) {
+            let mut record = with_error(ok(mesh, method, 100, 0, 0), error);
+            record.artifact = Some(format!("axes/{mesh}-{method}.ma"));
+            records.push(record);
+        }
+        records.extend((mesh != "c").then(|| failed(mesh, "lambda", 100, Status::Failed, "no")));
+    }
+    records[0].simplify.reached = Some(98);
+    let strips = picture_strips(&records);
+    let captions = strips.iter().map(|strip| -> Vec<&str> {
+        strip.panels.iter().map(|(_, caption)| caption.as_str()).collect()
+    });
+    let captions: Vec<Vec<&str>> = captions.collect();
+    assert_eq!(captions[0], ["qmat (98): Hausdorff 1.00 %", "angle: Hausdorff 1.20 %"]);
+    assert_eq!(captions[1], ["angle: Hausdorff 1.00 %", "qmat: Hausdorff 4.00 %"]);
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("pictures")).unwrap();
+    for strip in &strips {
+        fs::write(folder.path().join(&strip.file), "a picture").unwrap();
+    }
+    write_report(folder.path(), &records, &header(&METHODS)).unwrap();
+    let [page, _] = documents(&fs::read_to_string(folder.path().join("index.html")).unwrap());
+    assert_eq!(page["leading"], 1, "b");
+}
+
+#[test]
+fn paths_that_leave_the_folder_have_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |path: &str| file_inside(folder.path(), path);
+    fs::create_dir(folder.path().join("axes")).unwrap();
+    fs::write(folder.path().join("axes/x.ma"), "").unwrap();
+    assert_eq!(at("axes/x.ma"), Some(folder.path().join("axes/x.ma")));
+    for path in ["", ".", "..", "../x.ma", "axes/../../x.ma", "/etc/passwd"] {
+        assert_eq!(at(path), None, "{path}");
+    }
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("/etc", folder.path().join("out")).unwrap();
+        std::os::unix::fs::symlink("/etc/passwd", folder.path().join("axes/y.ma")).unwrap();
+        assert_eq!([at("out/passwd"), at("axes/y.ma")], [None, None]);
+    }
 }
 
 #[test]
@@ -361,11 +515,13 @@ fn a_page_of_one_mesh_counts_no_meshes() {
         report
     };
     let [one, two] = [&SHAPES[..1], &SHAPES[..2]].map(report);
-    for (page, columns) in [(&one, 5), (&two, 7)] {
+    for (page, columns) in [(&one, 6), (&two, 8)] {
         assert_eq!(page["answers"]["columns"].as_array().unwrap().len(), columns);
     }
-    let sections = |page: &serde_json::Value| page["sections"].to_string();
-    for counted in ["1 of 1", "1 mesh", "Means over meshes"] {
+    let sections = |page: &serde_json::Value| {
+        ["sections", "overview", "answers"].map(|part| page[part].to_string()).concat()
+    };
+    for counted in ["1 of 1", "on 1 mesh", "Means over meshes", "edian"] {
         assert!(!sections(&one).contains(counted), "{counted}: {}", sections(&one));
     }
     assert!(sections(&two).contains("Means over meshes") && sections(&two).contains("2 of 2"));

@@ -1,0 +1,167 @@
+//! All methods at one number of spheres, a line each: the end of a comparison, and the one table of the page.
+
+use std::collections::BTreeMap;
+
+use crate::answers::{by_bound, usual_level};
+use crate::comparison::{Comparison, RISING, RISING_NOTE, reached};
+use crate::header::MethodNote;
+use crate::metric::{HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
+use crate::record::Record;
+use crate::summary::{CountSummary, SeriesSummary, by_count, is_rising, native_curves};
+use crate::tables::{Cell, Table};
+use crate::text::{counted, grouped, printable, shortened};
+
+/// The longest line of the terminal and the longest name of a method there, in characters.
+const WIDTH: usize = 100;
+const NAME: usize = 20;
+
+/// The methods with a mean at the requested count nearest to 100, the least error first. Those without one are named in
+/// the last note with the reason. `None` where no method has one.
+pub(crate) fn overview_table(
+    comparison: &Comparison<'_>,
+    summaries: &[CountSummary],
+    methods: &[MethodNote],
+) -> Option<Table> {
+    let (level, count) = usual_level(comparison)?;
+    let summary = summaries.iter().find(|summary| summary.count == count)?;
+    let mut rows: Vec<&SeriesSummary> = vec![];
+    let mut missing: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+    for row in &summary.rows {
+        if row.mean(&HAUSDORFF).is_some() {
+            rows.push(row);
+        } else {
+            let why: Vec<&str> = row.without.keys().map(|status| status.key()).collect();
+            missing.entry(why.join(", ")).or_default().push(&comparison.series[row.series]);
+        }
+    }
+    let error = |row: &SeriesSummary| row.mean(&HAUSDORFF).unwrap_or(f64::INFINITY);
+    rows.sort_by(|a, b| error(a).total_cmp(&error(b))); // equal ones stay in order
+    let mean = |row: &SeriesSummary, metric: &Metric| {
+        let rises = metric.key == HAUSDORFF.key && is_rising(summaries, summary, row);
+        let mark = if rises { RISING } else { "" };
+        Cell::optional(row.mean(metric).map(|mean| metric.format_mean(mean) + mark))
+    };
+    let table = Table::of(&rows)
+        .text("method", |row| comparison.series[row.series].as_str())
+        .number("spheres", |row| {
+            let own = comparison.at(row.series, level).into_iter().filter(|e| e.comparable());
+            let counts = own.filter_map(|entry| Some(reached(entry.record)? as f64));
+            let mean = Mean::Arithmetic.of(&counts.collect::<Vec<_>>());
+            Cell::optional(mean.map(|mean| grouped(mean.round() as u64)))
+        })
+        .number("Hausdorff %", |row| mean(row, &HAUSDORFF))
+        .number("mean %", |row| mean(row, &MEAN_ERROR))
+        .text("topology", |row| Cell::share(row.topology))
+        .number("means over", |row| Cell::share((row.over, row.asked)))
+        .number("seconds", |row| mean(row, &TOTAL_SECONDS))
+        .text("best suited for", |row| {
+            let note = methods.iter().find(|note| note.id == comparison.methods[row.series]);
+            note.and_then(MethodNote::briefly).unwrap_or_default()
+        })
+        .table;
+    let is_one = comparison.meshes.len() == 1;
+    let over = if is_one { "" } else { ", geometric means" };
+    let mut notes = vec![format!(
+        "Errors in % of the diagonal{over}; topology: results with the Betti numbers of the solid."
+    )];
+    let has_rising = rows.iter().any(|row| is_rising(summaries, summary, row));
+    notes.extend(has_rising.then(|| RISING_NOTE.to_owned()));
+    let missing: Vec<String> =
+        missing.iter().map(|(why, names)| format!("{}: {why}", names.join(", "))).collect();
+    if !missing.is_empty() {
+        notes.push(format!("No result at this count: {}.", missing.join("; ")));
+    }
+    let table = if is_one { table.of_one_mesh() } else { table };
+    let [spheres, meshes] =
+        [counted(count, "sphere", "spheres"), counted(comparison.meshes.len(), "mesh", "meshes")];
+    let caption = format!("{spheres}, {meshes}");
+    (!table.rows.is_empty()).then_some(Table { caption, notes, ..table })
+}
+
+/// The end of a comparison as plain text, at most 100 characters wide: the table of all methods at the requested count
+/// nearest to 100, the methods within each error bound, and the medial mesh that the methods start from. `methods` tells
+/// what each is best suited for.
+pub fn summary_text(records: &[Record], methods: &[MethodNote]) -> String {
+    let comparison = Comparison::new(records);
+    let mut text = String::new();
+    if let Some(table) = overview_table(&comparison, &by_count(&comparison), methods) {
+        text += &format!("{}\n{}", table.caption, plain(&table));
+        table.notes.iter().for_each(|note| text += &wrapped(note));
+    }
+    for bound in by_bound(&comparison) {
+        let mut found = vec![];
+        for row in &bound.rows {
+            let Some(spheres) = row.spheres else { continue }; // kept on less than half of the meshes
+            let count = grouped(spheres.round() as u64);
+            let name = &comparison.series[row.series];
+            found.push((spheres, format!("{name} {count} ({} of {})", row.met, row.asked)));
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let found: Vec<String> = found.into_iter().map(|(_, text)| text).collect();
+        let found = if found.is_empty() { "none".to_owned() } else { found.join(", ") };
+        let title = "error, median of the fewest spheres (meshes that keep it)";
+        text += &wrapped(&format!("At most {} % {title}: {found}.", bound.percent));
+    }
+    text + &start(&comparison)
+}
+
+/// The errors and the topology of the medial mesh that all methods start from, where it was measured.
+fn start(comparison: &Comparison<'_>) -> String {
+    let mut curves = native_curves(comparison).into_iter();
+    let start = curves.find(|curve| comparison.is_start(curve.series));
+    let point = start.and_then(|curve| curve.points.into_iter().next());
+    point.map_or_else(String::new, |point| {
+        let errors = [(&HAUSDORFF, point.hausdorff), (&MEAN_ERROR, point.mean)];
+        let [hausdorff, mean] = errors.map(|(metric, mean)| metric.format_mean(mean));
+        let (right, known) = point.topology; // methods inherit what is wrong here
+        wrapped(&format!(
+            "Initial medial mesh: Hausdorff {hausdorff} %, mean {mean} %, topology right on {right} of {known}."
+        ))
+    })
+}
+
+/// The rows below the heads of their columns; the last column has the room that the others leave.
+fn plain(table: &Table) -> String {
+    let last = table.columns.len() - 1;
+    let heads: Vec<Cell> = table.columns.iter().map(|c| Cell::from(c.title.as_str())).collect();
+    let mut lines: Vec<Vec<String>> = vec![];
+    for cells in [&heads].into_iter().chain(&table.rows) {
+        let limit = |k: usize| if k < last { NAME } else { WIDTH };
+        let texts = cells.iter().enumerate();
+        lines.push(texts.map(|(k, cell)| shortened(&printable(&cell.text), limit(k))).collect());
+    }
+    let widest = |k: usize| lines.iter().map(|line| line[k].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..last).map(widest).collect();
+    let room = WIDTH.saturating_sub(widths.iter().map(|width| width + 2).sum());
+    let mut text = String::new();
+    for line in &lines {
+        let mut row = String::new();
+        for (k, &width) in widths.iter().enumerate() {
+            row += &match table.columns[k].number {
+                true => format!("{:>width$}  ", line[k]),
+                false => format!("{:<width$}  ", line[k]),
+            };
+        }
+        row += &shortened(&line[last], room);
+        text = text + row.trim_end() + "\n";
+    }
+    text
+}
+
+/// A sentence in lines that fit; all but the first are indented.
+fn wrapped(text: &str) -> String {
+    let (mut lines, mut used) = (String::new(), 0);
+    for word in printable(text).split(' ') {
+        let length = word.chars().count();
+        if used > 0 && used + 1 + length > WIDTH {
+            lines.push_str("\n ");
+            used = 1;
+        }
+        if used > 0 {
+            lines.push(' ');
+        }
+        lines.push_str(word);
+        used += 1 + length;
+    }
+    lines + "\n"
+}
