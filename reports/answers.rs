@@ -11,8 +11,7 @@
 use std::cmp::Ordering;
 
 use crate::comparison::{Comparison, Entry, reached};
-use crate::metric::{HAUSDORFF, MIN_ANGLE, Mean, TOTAL_SECONDS, median};
-use crate::plots::{Curve, Figure, Point, Scale};
+use crate::metric::{HAUSDORFF, MIN_ANGLE, TOTAL_SECONDS, median};
 use crate::record::{Record, Status, Target};
 use crate::summary::{Ratio, reference, topology};
 use crate::tables::{Cell, Column, Table};
@@ -29,9 +28,6 @@ const USABLE: f64 = 2.0;
 
 /// A larger error answers no question, in % of the diagonal: no result is better than such a one.
 const ANSWERS: f64 = 5.0;
-
-/// Values that differ by a smaller share are called equal: about what other samples change.
-const EQUAL: f64 = 0.01;
 
 /// For each mesh the least value of a method; `None` where the method was not asked.
 type Values = Vec<Option<Found>>;
@@ -65,13 +61,10 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
     let rule = format!(
         "Among the levels that were run. The initial medial mesh and errors above {ANSWERS} % answer no question."
     );
-    let medians = format!(
-        "Medians over the meshes that a method ran on: a missing result counts as infinite, and a method needs results \
+    let medians = "Medians over the meshes that a method ran on: a missing result counts as infinite, and a method needs results \
          on half of its meshes. Where the best median and the most results belong to two methods, both are named. The \
-         ratio to the runner-up is a geometric mean over the meshes where both have a result. The last column counts \
-         the meshes on which the first one is better, equal within {:.0} %, worse.",
-        100.0 * EQUAL
-    );
+         ratio to the runner-up is a geometric mean over the meshes where both have a result."
+        .to_owned();
     let notes = [how.to_owned(), rule].into_iter().chain((!is_one).then_some(medians));
     let columns = [
         "criterion",
@@ -81,7 +74,6 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
         "meshes",
         "runner-up",
         "ratio to it",
-        "better, equal, worse",
     ];
     let table = Table {
         caption: "Which method?".to_owned(),
@@ -91,8 +83,8 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
         grouped: false,
     };
     // Counts of meshes say nothing about one mesh.
-    let counts: &[&str] = if is_one { &["meshes", "better, equal, worse"] } else { &[] };
-    (!table.rows.is_empty()).then(|| table.without(counts))
+    let table = if is_one { table.without(&["meshes"]) } else { table };
+    (!table.rows.is_empty()).then_some(table)
 }
 
 /// The answers at one number of spheres.
@@ -185,7 +177,9 @@ fn values(
 ) -> Vec<Values> {
     let mut all: Vec<Values> = vec![vec![None; comparison.meshes.len()]; comparison.series.len()];
     for entry in &comparison.entries {
-        if level.is_none_or(|level| entry.level == level) && !comparison.is_start(entry.series) {
+        if level.is_none_or(|level| entry.level == level)
+            && comparison.methods[entry.series] != "initial"
+        {
             let seconds = TOTAL_SECONDS.of(entry.record).unwrap_or(f64::INFINITY);
             // A run without a result counts as infinitely bad, a mesh without a run not at all.
             let value = value(entry).unwrap_or(f64::INFINITY);
@@ -259,19 +253,13 @@ fn by_meshes(a: &Rank, b: &Rank) -> Ordering {
     a.missed.cmp(&b.missed).then_with(|| by_median(a, b))
 }
 
-/// How one series stands beside another, on the meshes where both have a result: the geometric mean of the ratios, and
-/// on how many it is better, equal, worse.
-fn lead(first: &Values, second: &Values) -> Option<(f64, String)> {
-    let ratios: Vec<f64> = (first.iter().zip(second))
-        .filter_map(|(a, b)| Some((a.as_ref()?.value, b.as_ref()?.value)))
-        .filter(|(a, b)| a.is_finite() && b.is_finite())
-        // Floors: a quotient of zeros is no number.
-        .map(|(a, b)| a.max(1e-9) / b.max(1e-9))
-        .collect();
-    let ratio = Mean::Geometric { floor: f64::MIN_POSITIVE }.of(&ratios)?;
-    let equal = ratios.iter().filter(|ratio| ratio.ln().abs() <= EQUAL).count();
-    let better = ratios.iter().filter(|ratio| ratio.ln() < -EQUAL).count();
-    Some((ratio, format!("{better}, {equal}, {}", ratios.len() - equal - better)))
+/// The geometric mean of the ratios of two series, over the meshes where both have a result.
+fn lead(first: &Values, second: &Values) -> Option<f64> {
+    let found = first.iter().zip(second).filter_map(|(a, b)| Some([(*a)?.value, (*b)?.value]));
+    let results = found.filter(|pair| pair.iter().all(|value| value.is_finite()));
+    // Floors: a quotient of zeros is no number.
+    let ratio = Ratio::of(results.map(|[a, b]| a.max(1e-9) / b.max(1e-9)));
+    ratio.map(|ratio| ratio.value)
 }
 
 /// The series that have a median, the best first.
@@ -318,12 +306,11 @@ fn answer(
         Some((rank.series, lead(&question.values[first], &question.values[rank.series])?))
     });
     cells.extend(match runner_up {
-        Some((second, (ratio, counts))) => [
+        Some((second, ratio)) => [
             Cell::from(comparison.series[second].as_str()),
             Cell::from(format!("{} of {}", significant(ratio, 2), question.of)),
-            Cell::from(counts),
         ],
-        None => [Cell::from("no other"), Cell::optional(None), Cell::optional(None)],
+        None => [Cell::from("no other"), Cell::optional(None)],
     });
     cells
 }
@@ -342,7 +329,7 @@ fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) ->
     let title = format!("topology right everywhere, lowest error at {spheres}");
     if ranks.is_empty() {
         let mut cells = vec![Cell::from(title), Cell::from("none")];
-        cells.extend([(); 6].map(|()| Cell::optional(None)));
+        cells.extend([(); 5].map(|()| Cell::optional(None)));
         return cells;
     }
     answer(comparison, &error_question(errors, title.clone()), title, &ranks)
@@ -476,34 +463,4 @@ pub(crate) fn equal_error_table(
         grouped: true,
         ..rows.table
     })
-}
-
-/// Fewest spheres against the error that they keep.
-pub(crate) fn equal_error_figure(
-    comparison: &Comparison<'_>,
-    bounds: &[BoundSummary],
-) -> Option<Figure> {
-    let curve = |series: usize| Curve {
-        series,
-        label: comparison.series[series].clone(),
-        name: comparison.series[series].clone(),
-        of: "median".to_owned(),
-        points: (bounds.iter())
-            .filter_map(|bound| {
-                let row = bound.rows.iter().find(|row| row.series == series)?;
-                Some(Point { n: Some(row.asked), ..Point::at(bound.percent, row.spheres?) })
-            })
-            .collect(),
-        ..Curve::default()
-    };
-    let figure = Figure {
-        stem: "overview-equal-error".to_owned(),
-        title: "Equal error: median of the fewest spheres, searched for".to_owned(),
-        x: "Hausdorff error kept (% of diagonal)".to_owned(),
-        y: ("spheres".to_owned(), Scale::Log),
-        curves: (0..comparison.series.len()).map(curve).collect(),
-        front: false,
-        leading: false,
-    };
-    figure.with_points()
 }

@@ -155,11 +155,6 @@ impl<'a> Comparison<'a> {
         point(entry).is_some_and(|own| rises(own, &points))
     }
 
-    /// Whether a series is the medial mesh that all methods start from.
-    pub(crate) fn is_start(&self, series: usize) -> bool {
-        self.methods[series] == "initial"
-    }
-
     /// The sphere counts that were asked, with their level indices, from many to few.
     pub(crate) fn counts(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.levels.iter().enumerate().filter_map(|(index, level)| match level {
@@ -206,8 +201,8 @@ const RISE: f64 = 0.05;
 
 /// The mark of such an error, and its meaning.
 pub(crate) const RISING: &str = " †";
-pub(crate) const RISING_NOTE: &str = "†: non-monotone, more than 5 % above the error of the same method with fewer \
-    spheres.";
+pub(crate) const RISING_NOTE: &str =
+    "†: non-monotone, on a mesh more than 5 % above the error with fewer spheres.";
 
 /// Whether the error of a result is larger by more than 5 % than one of fewer spheres, among results of one method as
 /// numbers of spheres and errors.

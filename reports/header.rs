@@ -40,18 +40,6 @@ pub struct Running {
     pub missing: Vec<String>,
 }
 
-impl Running {
-    /// The banner of the page.
-    pub(crate) fn banner(&self) -> String {
-        let missing = match self.missing.is_empty() {
-            true => String::new(),
-            false => format!("; missing: {}", self.missing.join(", ")),
-        };
-        let methods = if self.total == 1 { "method" } else { "methods" };
-        format!("{} of {} {methods} done{missing}.", self.done, self.total)
-    }
-}
-
 /// One run of the program that added records.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunNote {
@@ -178,27 +166,5 @@ impl Header {
         let end = command.unwrap_or_else(|| ".".to_owned());
         let parts = [version, earlier, date].map(Option::unwrap_or_default).concat();
         format!("Made by medial{parts}{end}")
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_command_that_adds_methods_keeps_meshes_and_folder() {
-        let adding = |command: &str| {
-            let run = RunNote { command: command.to_owned(), ..RunNote::default() };
-            Header { runs: vec![run], ..Header::default() }.command_with(&["tight", "vmas"])
-        };
-        assert_eq!(
-            adding(
-                "medial compare 'a b.off' --fresh --methods qmat --set qmat.k=1 --spheres=50 --out x"
-            ),
-            "medial compare 'a b.off' --spheres=50 --out x --methods tight,vmas"
-        );
-        for other in ["medial report a b --out c", ""] {
-            assert_eq!(adding(other), "medial compare MESH --out DIR --methods tight,vmas");
-        }
     }
 }

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use crate::answers::{by_bound, usual_level};
+use crate::answers::{by_bound, equal_error_table, usual_level};
 use crate::comparison::{Comparison, RISING, RISING_NOTE, reached};
 use crate::header::MethodNote;
 use crate::metric::{HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
 use crate::record::Record;
-use crate::summary::{CountSummary, SeriesSummary, by_count, is_rising, native_curves};
+use crate::summary::{CountSummary, SeriesSummary, by_count};
 use crate::tables::{Cell, Table};
 use crate::text::{counted, grouped, printable, shortened};
 
@@ -37,7 +37,7 @@ pub(crate) fn overview_table(
     let error = |row: &SeriesSummary| row.mean(&HAUSDORFF).unwrap_or(f64::INFINITY);
     rows.sort_by(|a, b| error(a).total_cmp(&error(b))); // equal ones stay in order
     let mean = |row: &SeriesSummary, metric: &Metric| {
-        let rises = metric.key == HAUSDORFF.key && is_rising(summaries, summary, row);
+        let rises = metric.key == HAUSDORFF.key && row.rising;
         let mark = if rises { RISING } else { "" };
         Cell::optional(row.mean(metric).map(|mean| metric.format_mean(mean) + mark))
     };
@@ -61,10 +61,9 @@ pub(crate) fn overview_table(
         .table;
     let is_one = comparison.meshes.len() == 1;
     let over = if is_one { "" } else { ", geometric means" };
-    let mut notes = vec![format!(
-        "Errors in % of the diagonal{over}; topology: results with the Betti numbers of the solid."
-    )];
-    let has_rising = rows.iter().any(|row| is_rising(summaries, summary, row));
+    let right = "topology: results with the Betti numbers of the solid";
+    let mut notes = vec![format!("Errors in % of the diagonal{over}; {right}.")];
+    let has_rising = rows.iter().any(|row| row.rising);
     notes.extend(has_rising.then(|| RISING_NOTE.to_owned()));
     let missing: Vec<String> =
         missing.iter().map(|(why, names)| format!("{}: {why}", names.join(", "))).collect();
@@ -72,15 +71,13 @@ pub(crate) fn overview_table(
         notes.push(format!("No result at this count: {}.", missing.join("; ")));
     }
     let table = if is_one { table.of_one_mesh() } else { table };
-    let [spheres, meshes] =
-        [counted(count, "sphere", "spheres"), counted(comparison.meshes.len(), "mesh", "meshes")];
-    let caption = format!("{spheres}, {meshes}");
+    let meshes = counted(comparison.meshes.len(), "mesh", "meshes");
+    let caption = format!("{}, {meshes}", counted(count, "sphere", "spheres"));
     (!table.rows.is_empty()).then_some(Table { caption, notes, ..table })
 }
 
 /// The end of a comparison as plain text, at most 100 characters wide: the table of all methods at the requested count
-/// nearest to 100, the methods within each error bound, and the medial mesh that the methods start from. `methods` tells
-/// what each is best suited for.
+/// nearest to 100, and that of the error bounds where there are any. `methods` tells what each is best suited for.
 pub fn summary_text(records: &[Record], methods: &[MethodNote]) -> String {
     let comparison = Comparison::new(records);
     let mut text = String::new();
@@ -88,36 +85,11 @@ pub fn summary_text(records: &[Record], methods: &[MethodNote]) -> String {
         text += &format!("{}\n{}", table.caption, plain(&table));
         table.notes.iter().for_each(|note| text += &wrapped(note));
     }
-    for bound in by_bound(&comparison) {
-        let mut found = vec![];
-        for row in &bound.rows {
-            let Some(spheres) = row.spheres else { continue }; // kept on less than half of the meshes
-            let count = grouped(spheres.round() as u64);
-            let name = &comparison.series[row.series];
-            found.push((spheres, format!("{name} {count} ({} of {})", row.met, row.asked)));
-        }
-        found.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let found: Vec<String> = found.into_iter().map(|(_, text)| text).collect();
-        let found = if found.is_empty() { "none".to_owned() } else { found.join(", ") };
-        let title = "error, median of the fewest spheres (meshes that keep it)";
-        text += &wrapped(&format!("At most {} % {title}: {found}.", bound.percent));
+    if let Some(table) = equal_error_table(&comparison, &by_bound(&comparison), "") {
+        let table = table.without(&["on", "stored numbers ↓", "failed"]); // wider than a line
+        text += &format!("\n{}\n{}", table.caption, plain(&table));
     }
-    text + &start(&comparison)
-}
-
-/// The errors and the topology of the medial mesh that all methods start from, where it was measured.
-fn start(comparison: &Comparison<'_>) -> String {
-    let mut curves = native_curves(comparison).into_iter();
-    let start = curves.find(|curve| comparison.is_start(curve.series));
-    let point = start.and_then(|curve| curve.points.into_iter().next());
-    point.map_or_else(String::new, |point| {
-        let errors = [(&HAUSDORFF, point.hausdorff), (&MEAN_ERROR, point.mean)];
-        let [hausdorff, mean] = errors.map(|(metric, mean)| metric.format_mean(mean));
-        let (right, known) = point.topology; // methods inherit what is wrong here
-        wrapped(&format!(
-            "Initial medial mesh: Hausdorff {hausdorff} %, mean {mean} %, topology right on {right} of {known}."
-        ))
-    })
+    text
 }
 
 /// The rows below the heads of their columns; the last column has the room that the others leave.
@@ -151,17 +123,14 @@ fn plain(table: &Table) -> String {
 /// A sentence in lines that fit; all but the first are indented.
 fn wrapped(text: &str) -> String {
     let (mut lines, mut used) = (String::new(), 0);
-    for word in printable(text).split(' ') {
+    for word in printable(text).split_inclusive(' ') {
         let length = word.chars().count();
-        if used > 0 && used + 1 + length > WIDTH {
-            lines.push_str("\n ");
-            used = 1;
-        }
-        if used > 0 {
-            lines.push(' ');
+        if used + length > WIDTH {
+            lines = lines.trim_end().to_owned() + "\n  ";
+            used = 2;
         }
         lines.push_str(word);
-        used += 1 + length;
+        used += length;
     }
     lines + "\n"
 }

@@ -12,7 +12,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::comparison::{Comparison, Entry, RISING, RISING_NOTE, level_label, reached, rises};
+use crate::comparison::{Comparison, Entry, RISING, RISING_NOTE, level_label, reached};
 use crate::header::Header;
 use crate::metric::{COMPARED, GEOMETRIC, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
 use crate::record::{Record, Status, Target};
@@ -48,6 +48,8 @@ pub(crate) struct SeriesSummary {
     /// Results with the Betti numbers of the solid, of those where both are known; over all meshes
     /// on which it reached the count.
     pub(crate) topology: (usize, usize),
+    /// Whether the error is above one of fewer spheres on any mesh.
+    pub(crate) rising: bool,
 }
 
 /// One method in relation to the reference, over the meshes that both reached.
@@ -209,6 +211,7 @@ fn at_count(
             means,
             ratio: ratio(&entries, &yardstick),
             topology: topology(&reached),
+            rising: reached.iter().any(|entry| comparison.is_rising(entry)),
         });
     }
     CountSummary { count, meshes: meshes.len(), rows }
@@ -369,14 +372,12 @@ pub(crate) fn means_table(
         .text("on", |(_, row)| {
             Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes")))
         });
-    let is_rising = |summary: &CountSummary, row| is_rising(summaries, summary, row);
-    let rising_note = places.iter().any(|(s, row)| is_rising(s, row)).then_some(RISING_NOTE);
+    let rising_note = places.iter().any(|(_, row)| row.rising).then_some(RISING_NOTE);
     for metric in COMPARED {
         rows = rows.number(metric.heading(), |(summary, row)| {
             let mut cell = mean_cell(summary, row, metric);
-            if metric.key == HAUSDORFF.key && is_rising(summary, row) {
-                cell.text.push_str(RISING);
-            }
+            let rises = metric.key == HAUSDORFF.key && row.rising;
+            cell.text.push_str(if rises { RISING } else { "" });
             cell
         });
     }
@@ -400,19 +401,6 @@ pub(crate) fn means_table(
         grouped: true,
         ..rows.table
     }
-}
-
-/// Whether a method's mean error is above that of fewer spheres.
-pub(crate) fn is_rising(
-    summaries: &[CountSummary],
-    summary: &CountSummary,
-    row: &SeriesSummary,
-) -> bool {
-    let point = |count: usize, row: &SeriesSummary| Some((count as f64, row.mean(&HAUSDORFF)?));
-    let all = summaries.iter().flat_map(|s| s.rows.iter().map(|row| (s.count, row)));
-    let own = all.filter(|(_, other)| other.series == row.series);
-    let points: Vec<(f64, f64)> = own.filter_map(|(count, row)| point(count, row)).collect();
-    point(summary.count, row).is_some_and(|own| rises(own, &points))
 }
 
 /// A mean, in parentheses where it is not over all meshes.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 
-use crate::answers::{by_bound, equal_error_figure, equal_error_table, purpose_table};
+use crate::answers::{by_bound, equal_error_table, purpose_table};
 use crate::comparison::Comparison;
 use crate::header::Header;
 use crate::journal::{check_regular, replace_file};
@@ -64,8 +64,7 @@ pub fn write_report(
         files.write_tables("overview-purpose", "Which method?", answers.as_slice())?;
     }
 
-    let mut figures = mean_figures(&comparison, &summaries, &natives);
-    figures.extend(equal_error_figure(&comparison, &bounds));
+    let figures = mean_figures(&comparison, &summaries, &natives);
     files.write_plots(&figures)?;
 
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));

@@ -6,7 +6,6 @@
 
 mod records;
 
-use std::collections::BTreeMap;
 use std::io::Write;
 
 use base64::Engine;
@@ -16,11 +15,11 @@ use flate2::write::GzEncoder;
 use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, level_label};
-use crate::header::{Header, MethodNote, RunNote, Running};
+use crate::header::{Header, MethodNote, RunNote};
 use crate::metric::{BELOW_30, COMPARED, EPSILON, Metric, SPHERES_ONLY};
 use crate::pictures::most_telling;
 use crate::plots::{Figure, symbol};
-use crate::record::{Machine, Status};
+use crate::record::Machine;
 use crate::tables::Table;
 use crate::text::{betti, counted, escape_html, grouped, printable};
 
@@ -162,10 +161,6 @@ impl Page<'_> {
             let tables: Vec<Table> = tables.iter().map(without_command).collect();
             sections.push(json!({"id": id, "title": title, "tables": tables}));
         }
-        if let Some(table) = self.failures() {
-            let title = table.caption.clone();
-            sections.push(json!({"id": "failures", "title": title, "tables": [table]}));
-        }
         let methods = header
             .methods
             .iter()
@@ -184,7 +179,7 @@ impl Page<'_> {
             "command": command,
             "earlier": runs.split_last().map_or(&[][..], |(_, earlier)| earlier).iter().map(earlier).collect::<Vec<_>>(),
             "study": header.study,
-            "running": header.running.as_ref().map(Running::banner),
+            "running": header.running,
             "alert": self.alert(),
             "notices": header.notes.iter().cloned().chain(comparison.cautions()).collect::<Vec<_>>(),
             "series": series.collect::<Vec<_>>(),
@@ -211,7 +206,7 @@ impl Page<'_> {
         })
     }
 
-    /// Counts of methods, meshes and levels, date, version and machine.
+    /// Counts of methods, meshes, levels and results, date, version and machine.
     fn facts(&self) -> Vec<String> {
         let comparison = self.comparison;
         let mut facts = vec![format!(
@@ -220,6 +215,11 @@ impl Page<'_> {
             counted(comparison.meshes.len(), "mesh", "meshes"),
             counted(comparison.levels.len(), "level", "levels"),
         )];
+        let runs = &comparison.entries;
+        let missed = runs.iter().filter(|entry| !entry.record.status.is_ok()).count();
+        let runs = counted(runs.len(), "run", "runs");
+        let fact = format!("{} of {runs} without the requested result", grouped(missed as u64));
+        facts.extend((missed > 0).then_some(fact));
         let run = self.header.runs.last();
         facts.extend(run.and_then(|run| run.date.clone()));
         facts.extend(
@@ -282,39 +282,6 @@ impl Page<'_> {
             "initial": initial,
         })
     }
-
-    /// Runs without the requested result, grouped by method, status and reason.
-    fn failures(&self) -> Option<Table> {
-        let mut groups: BTreeMap<(usize, Status, &str), Vec<String>> = BTreeMap::new();
-        for entry in self.comparison.entries.iter().filter(|entry| !entry.record.status.is_ok()) {
-            let reason = match entry.record.status {
-                // Each such reason has its own number: one row for all of them.
-                Status::OtherCount => "another number of spheres than requested: not compared",
-                Status::BoundMissed => "no level that was tried keeps the error",
-                _ => entry.record.reason.as_deref().unwrap_or("no reason was recorded"),
-            };
-            let level = level_label(entry.record.simplify.level);
-            let places = groups.entry((entry.series, entry.record.status, reason)).or_default();
-            places.push(format!("{} ({level})", self.comparison.meshes[entry.mesh]));
-        }
-        let runs: usize = groups.values().map(Vec::len).sum();
-        type Group<'a> = ((usize, Status, &'a str), Vec<String>);
-        let groups: Vec<Group<'_>> = groups.into_iter().collect();
-        let rows = Table::of(&groups)
-            .text("method", |group| self.comparison.series[group.0.0].as_str())
-            .text("status", |group| group.0.1.to_string())
-            .text("reason", |group| group.0.2)
-            .number("runs", |(_, places)| places.len().to_string())
-            .text("meshes (requested)", |(_, places)| abridged(places));
-        (runs > 0).then(|| Table {
-            caption: format!(
-                "{} of {} without the requested result",
-                grouped(runs as u64),
-                counted(self.comparison.entries.len(), "run", "runs")
-            ),
-            ..rows.table
-        })
-    }
 }
 
 /// The page's head shows the command once for all tables: it is the first note of each.
@@ -339,16 +306,6 @@ fn earlier(run: &RunNote) -> String {
     let date = run.date.as_deref().unwrap_or("no date");
     let build: String = run.binary_hash.chars().take(8).collect();
     format!("{date}, medial {} (build {build}): {}", run.version, run.command)
-}
-
-/// The first few of a list; the table of results holds them all.
-fn abridged(items: &[String]) -> String {
-    const SHOWN: usize = 6;
-    let mut text = items.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ");
-    if items.len() > SHOWN {
-        text.push_str(&format!(" and {} more", items.len() - SHOWN));
-    }
-    text
 }
 
 /// The meaning of each metric. The page knows those of its other words.

@@ -195,8 +195,10 @@ const start = async () => {
   const others = overview.filter((figure) => !figure.leading);
   const parts = [];
   if (report.running) {
-    parts.push(make("p", { class: "notice running", role: "status" }, make("strong", {}, "Still running: "), report.running,
-      " This page shows the results so far; reload it for more."));
+    const { done, total, missing } = report.running;
+    const rest = missing.length ? `; missing: ${missing.join(", ")}` : "";
+    parts.push(make("p", { class: "notice running", role: "status" }, make("strong", {}, "Still running: "),
+      `${done} of ${counted(total, "method", "methods")} done${rest}. This page shows the results so far; reload it for more.`));
   }
   if (report.alert) {
     parts.push(make("p", { class: "notice bad", role: "alert" }, report.alert));
@@ -239,7 +241,7 @@ const start = async () => {
     const bibtex = ["BibTeX of the methods and the program", "./tables/methods.bib", report.papers];
     folds.push(fold("papers", "For papers", make("p", {}, about), paste(...bibtex)));
   }
-  folds.push(fold("files", "Files", make("ul", {}, ...FILES.slice(0, report.sections.some(({ id }) => id !== "failures") ? 4 : 2).map(([path, text]) =>
+  folds.push(fold("files", "Files", make("ul", {}, ...FILES.slice(0, report.sections.length ? 4 : 2).map(([path, text]) =>
     make("li", {}, make("a", { href: `./${path}` }, path), `: ${text}`)))));
   const runs = [
     report.earlier.length && make("h3", {}, `${counted(report.earlier.length, "earlier run", "earlier runs")} that added records`),

@@ -9,12 +9,11 @@ const plotOf = (figure) => {
   const lay = (axis, value) => (figure[axis].scale === "log" ? Math.log(value) : value);
   const unlay = (axis, value) => (figure[axis].scale === "log" ? Math.exp(value) : value);
   const laid = ([x, y], more) => ({ u: lay("x", x), v: lay("y", y), x, y, ...more });
-  const points = figure.curves.flatMap((curve) => curve.points.map(([x, y, n, spheres, isFront, , isRising]) =>
-    laid([x, y], { n, spheres, isFront, isRising, curve })).filter(({ u, v }) => Number.isFinite(u) && Number.isFinite(v)));
+  const points = figure.curves.flatMap((curve) => curve.points.map(([x, y, n, spheres, , isRising]) =>
+    laid([x, y], { n, spheres, isRising, curve })).filter(({ u, v }) => Number.isFinite(u) && Number.isFinite(v)));
   const lines = figure.curves.flatMap((curve) => curve.points.map((at) => laid(at, { curve })));
-  const tags = figure.curves.flatMap((curve) => curve.points.filter((point) => point[5] !== null)
-    .map((point) => laid(point, { text: point[5], curve })));
-  const front = points.filter((point) => point.isFront).sort((a, b) => a.x - b.x);
+  const tags = figure.curves.flatMap((curve) => curve.points.filter((point) => point[4] !== null)
+    .map((point) => laid(point, { text: point[4], curve })));
 
   // A linear axis begins at zero, a logarithmic one spans at least a factor of two, or a single value
   // would have no scale.
@@ -48,12 +47,12 @@ const plotOf = (figure) => {
       ? kept : [...kept, tag]), []);
   };
 
-  const words = ({ x, y, n, spheres, isFront, isRising, curve }) => {
+  const words = ({ x, y, n, spheres, isRising, curve }) => {
     const format = (value) => value.toLocaleString("en", { maximumSignificantDigits: 4 });
     const of = n === null ? "" : `n = ${counted(n, "mesh", "meshes")}`;
     return [curve.name, [curve.of, of].filter(Boolean).join(", "), `${figure.x.title}: ${format(x)}`,
       `${figure.y.title}: ${format(y)}`, spheres === null ? "" : `spheres: ${format(spheres)}`,
-      isFront ? "not dominated" : "", isRising ? "non-monotone: above the error of fewer spheres" : ""].filter(Boolean).join("\n");
+      isRising ? "non-monotone: above the error of fewer spheres" : ""].filter(Boolean).join("\n");
   };
 
   const box = make("figure", { class: "plot" });
@@ -78,7 +77,6 @@ const plotOf = (figure) => {
         Plot.frame({ stroke: "var(--rule)" }),
         Plot.line(solid, { ...common, z, stroke: colour, strokeWidth: 2 }),
         Plot.line(dashed, { ...common, z, stroke: colour, strokeWidth: 2, strokeDasharray: "7 5" }),
-        Plot.line(front.length > 1 ? front : [], { ...common, stroke: "currentColor", strokeWidth: 1 }),
         Plot.dot(seen, { ...common, symbol, stroke: colour, fill: hollow, r: 4, clip: false }),
         Plot.dot(seen.filter((point) => point.isRising), { ...common, r: 7.5, stroke: "currentColor", strokeWidth: 1.2, clip: false }),
         Plot.text(apart(), { x: "u", y: "v", text: "text", dx: 7, dy: -7, textAnchor: "start", fontSize: 10 }),
@@ -220,7 +218,6 @@ const plotOf = (figure) => {
     });
     legend.append(row);
   }
-  if (front.length > 1) legend.append(make("span", { class: "front" }, "not dominated"));
   if (points.some((point) => point.isRising)) legend.append(make("span", { class: "rising" }, "non-monotone: error above that of fewer spheres"));
   const tools = make("div", { class: "tools" }, reset, button("−", "show more", () => zoom(0.5)), button("+", "enlarge", () => zoom(2)));
   stage.append(draw());

@@ -1,7 +1,7 @@
 //! Plots: what stands in them. The page draws a [`Figure`] from its JSON, `svg` draws it for papers.
 //!
 //! Every number of a figure is computed here, so both drawings show the same points, the same
-//! front and the same labels.
+//! labels.
 
 mod axis;
 mod svg;
@@ -25,8 +25,6 @@ pub(crate) struct Figure {
     pub(crate) x: String,
     pub(crate) y: (String, Scale),
     pub(crate) curves: Vec<Curve>,
-    /// Whether less is better on both axes, so that some points dominate others.
-    pub(crate) front: bool,
     /// Whether the page shows it unfolded.
     pub(crate) leading: bool,
 }
@@ -54,37 +52,21 @@ pub(crate) struct Point {
     pub(crate) n: Option<usize>,
     /// Spheres of the result, or their mean, where no axis shows them.
     pub(crate) spheres: Option<f64>,
-    /// Whether it is over the same meshes as the others, and so may dominate them.
-    pub(crate) compared: bool,
     /// Text next to the point.
     pub(crate) tag: Option<String>,
     /// Whether it is an error above one of fewer spheres.
     pub(crate) rising: bool,
 }
 
-impl Point {
-    pub(crate) fn at(x: f64, y: f64) -> Self {
-        Self { x, y, ..Self::default() }
-    }
-}
-
 impl Figure {
-    /// The figure without its empty curves; `None` where no curve is left.
-    pub(crate) fn with_points(mut self) -> Option<Self> {
-        self.curves.retain(|curve| !curve.points.is_empty()); // no legend without a mark
-        (!self.curves.is_empty()).then_some(self)
-    }
-
     /// The figure for the script of the page: numbers with five digits.
     pub(crate) fn to_json(&self) -> Value {
-        let front = self.front();
         let rounded = |value| significant(value, 5).parse().unwrap_or(value);
-        let curves = self.curves.iter().enumerate().map(|(index, curve)| {
-            let points = curve.points.iter().enumerate().map(|(k, point)| {
-                let is_front = u8::from(front.contains(&(index, k)));
+        let curves = self.curves.iter().map(|curve| {
+            let points = curve.points.iter().map(|point| {
                 let [x, y] = [point.x, point.y].map(rounded);
                 let is_rising = u8::from(point.rising);
-                json!([x, y, point.n, point.spheres.map(rounded), is_front, point.tag, is_rising])
+                json!([x, y, point.n, point.spheres.map(rounded), point.tag, is_rising])
             });
             json!({
                 "series": curve.series, "label": curve.label, "name": curve.name, "of": curve.of,
@@ -96,32 +78,6 @@ impl Figure {
             "x": {"title": self.x, "scale": Scale::Log}, "y": {"title": self.y.0, "scale": self.y.1},
             "curves": curves.collect::<Vec<_>>(),
         })
-    }
-
-    /// The non-dominated points, by curve and index, from left to right: no other point is at most
-    /// as large in both coordinates. Empty where fewer than two series compare.
-    fn front(&self) -> Vec<(usize, usize)> {
-        let mut all = vec![];
-        for (index, curve) in self.curves.iter().enumerate().filter(|_| self.front) {
-            for (k, p) in curve.points.iter().enumerate() {
-                if p.compared && p.x > 0.0 && p.y.is_finite() {
-                    all.push((p.x, p.y, index, k)); // indices break ties
-                }
-            }
-        }
-        let first = all.first().map(|point| self.curves[point.2].series);
-        if all.iter().all(|point| Some(self.curves[point.2].series) == first) {
-            return Vec::new();
-        }
-        // From left to right a point is dominated unless it is lower than all before it.
-        all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        let mut lowest = f64::INFINITY;
-        all.retain(|&(_, y, _, _)| {
-            let is_lower = y < lowest; // strictly: of equal ones the left one stays
-            lowest = lowest.min(y);
-            is_lower
-        });
-        all.into_iter().map(|(_, _, curve, point)| (curve, point)).collect()
     }
 }
 
@@ -147,7 +103,7 @@ impl Kind {
         !matches!(self.0, "angles" | "spikes")
     }
 
-    fn figure(&self, stem: &str, of: &str, curves: Vec<Curve>) -> Option<Figure> {
+    fn figure(&self, stem: &str, of: &str, mut curves: Vec<Curve>) -> Option<Figure> {
         let Self(name, title, _) = self;
         let y = match *name {
             "angles" => "mean smallest angle (degrees)",
@@ -156,41 +112,37 @@ impl Kind {
             _ => "Hausdorff error (% of diagonal)",
         };
         let scale = if self.is_error() { Scale::Log } else { Scale::Linear };
-        let figure = Figure {
+        curves.retain(|curve| !curve.points.is_empty()); // no legend without a mark
+        (!curves.is_empty()).then(|| Figure {
             stem: format!("{stem}-{name}"),
             title: format!("{of}: {title}"),
             x: if self.is_over_time() { "time (s)".to_owned() } else { "spheres".to_owned() },
             y: (y.to_owned(), scale),
             curves,
-            front: self.is_error(),
             leading: matches!(*name, "hausdorff" | "time"),
-        };
-        figure.with_points()
+        })
     }
 
-    /// A curve of results or means: spheres, seconds and y of each, the meshes behind it, and of how many. Those over
-    /// all meshes are compared. Over time both ends are tagged with their number of spheres, which no axis shows. Dashes
-    /// are at native levels, where an error that rises has no mark.
+    /// A curve of results or means: spheres, seconds and y of each, and the number of meshes behind it. Over time both
+    /// ends are tagged with their number of spheres, which no axis shows. Dashes are at native levels, where an error that
+    /// rises has no mark.
     fn curve(
         &self,
         series: usize,
         (name, of): (&str, &str),
         dashed: bool,
-        points: impl IntoIterator<Item = (f64, Option<f64>, Option<f64>, [usize; 2])>,
+        points: impl IntoIterator<Item = (f64, Option<f64>, Option<f64>, usize)>,
     ) -> Curve {
         let points: Vec<_> = points.into_iter().collect();
-        let errors: Vec<(f64, f64)> = (points.iter())
-            .filter_map(|&(spheres, _, y, _)| {
-                Some((spheres, y.filter(|_| self.is_error() && !dashed)?))
-            })
-            .collect();
+        let mut errors: Vec<(f64, f64)> =
+            points.iter().filter_map(|&(spheres, _, y, _)| Some((spheres, y?))).collect();
+        errors.retain(|_| self.is_error() && !dashed);
         let mut points: Vec<Point> = (points.into_iter())
-            .filter_map(|(spheres, seconds, y, [n, all])| {
+            .filter_map(|(spheres, seconds, y, n)| {
                 let rising = rises((spheres, y?), &errors);
                 let (x, spheres) =
                     if self.is_over_time() { (seconds?, Some(spheres)) } else { (spheres, None) };
-                let compared = n == all;
-                Some(Point { x, y: y?, n: Some(n), spheres, compared, tag: None, rising })
+                Some(Point { x, y: y?, n: Some(n), spheres, tag: None, rising })
             })
             .collect();
         for k in [0, points.len().saturating_sub(1)] {
@@ -217,7 +169,7 @@ pub(crate) fn mesh_figures(comparison: &Comparison<'_>, mesh: usize, stem: &str)
                 .collect();
             records.sort_by_key(|record| std::cmp::Reverse(reached(record)));
             let points = records.into_iter().filter_map(|record| {
-                Some((reached(record)? as f64, TOTAL_SECONDS.of(record), kind.2.of(record), [1, 1]))
+                Some((reached(record)? as f64, TOTAL_SECONDS.of(record), kind.2.of(record), 1))
             });
             let names = (&*comparison.series[series], &*comparison.meshes[mesh]);
             let mut curve = kind.curve(series, names, dashed, points);
@@ -252,7 +204,7 @@ pub(crate) fn mean_figures(
                     "mean" => Some(point.mean),
                     _ => None,
                 };
-                (point.spheres, None, y, [native.over, comparison.meshes.len()])
+                (point.spheres, None, y, native.over)
             });
             let mut curve = kind.curve(series, (&name, "mean"), true, points);
             if !curves[series].points.is_empty() {
@@ -281,39 +233,8 @@ fn mean_curve(
         if over != summary.meshes {
             label = format!("{name} ({over} of {})", summary.meshes);
         }
-        let of = [over, summary.meshes];
-        Some((summary.count as f64, row.mean(&TOTAL_SECONDS), Some(y), of))
+        Some((summary.count as f64, row.mean(&TOTAL_SECONDS), Some(y), over))
     });
     let curve = kind.curve(series, (name, "mean"), false, points);
     Curve { label, ..curve }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn curve(series: usize, points: &[(f64, f64)], compared: bool) -> Curve {
-        let point = |&(x, y): &(f64, f64)| Point { compared, ..Point::at(x, y) };
-        Curve { series, points: points.iter().map(point).collect(), ..Curve::default() }
-    }
-
-    #[test]
-    fn the_front_holds_the_points_that_nothing_dominates() {
-        let mut figure = Figure {
-            stem: String::new(),
-            title: String::new(),
-            x: String::new(),
-            y: (String::new(), Scale::Log),
-            curves: vec![
-                curve(0, &[(1.0, 5.0), (2.0, 3.0), (4.0, 3.0)], true),
-                curve(1, &[(1.5, 6.0), (3.0, 1.0), (3.0, 0.5)], true),
-                curve(2, &[(0.5, 0.1)], false),
-            ],
-            front: true,
-            leading: false,
-        };
-        assert_eq!(figure.front(), [(0, 0), (0, 1), (1, 2)]);
-        figure.curves.truncate(1);
-        assert!(figure.front().is_empty(), "one series has nothing to dominate");
-    }
 }

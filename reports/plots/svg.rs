@@ -59,7 +59,6 @@ fn colour(series: usize) -> RGBColor {
 /// The fonts that the texts of all figures name, the first one that is there.
 const FONTS: &str = "Helvetica, Arial, sans-serif";
 
-const FRONT: &str = "not dominated";
 const RISING: &str = "non-monotone";
 
 /// Any error of plotters: only writing can fail, and a text takes everything.
@@ -80,16 +79,12 @@ impl Figure {
         let x = Axis::fit(Scale::Log, points.iter().map(|point| point.x));
         let y = Axis::fit(self.y.1, points.iter().map(|point| point.y));
         let (Some(x), Some(y)) = (x, y) else { return Ok(None) };
-        let rows = self.curves.iter().filter(|curve| !curve.label.is_empty()).count() + 2;
+        let rows = self.curves.iter().filter(|curve| !curve.label.is_empty()).count() + 1;
         let size = (WIDTH as u32, HEIGHT.max(rows as i32 * LEGEND_ROW + 120) as u32);
         let mut svg = String::new();
         self.draw(x, y, &SVGBackend::with_string(&mut svg, size).into_drawing_area())
             .map_err(|error| ReportError::content("a plot", format!("plot: {error}")))?;
         Ok(Some(svg))
-    }
-
-    fn is_rising(&self) -> bool {
-        self.curves.iter().any(|curve| curve.points.iter().any(|point| point.rising))
     }
 
     fn draw(&self, x: Axis, y: Axis, area: &Area<'_>) -> Drawn {
@@ -98,7 +93,7 @@ impl Figure {
         area.draw(&Text::new(title, (28, 40), font(30, HPos::Left)))?;
         let (_, below) = area.split_vertically(68);
         let longest = self.curves.iter().map(|curve| legend_text(curve).chars().count()).max();
-        let legend_width = (88 + 14 * longest.unwrap_or(0).max(FRONT.len()) as i32).min(460);
+        let legend_width = (88 + 14 * longest.unwrap_or(0).max(RISING.len()) as i32).min(460);
         let (plot, legend) = below.split_horizontally(WIDTH - legend_width);
         let (x_ticks, y_ticks) = (x.ticks.len(), y.ticks.len());
         let mut chart = ChartBuilder::on(&plot)
@@ -148,21 +143,11 @@ impl Figure {
                 }
             }
         }
-        let front: Vec<(f64, f64)> = (self.front().into_iter())
-            .map(|(curve, point)| &self.curves[curve].points[point])
-            .map(|point| (point.x, point.y))
-            .collect();
-        // A single point dominates all others, which no line shows.
-        let has_front = front.len() > 1;
-        if has_front {
-            let line = LineSeries::new(front, INK.stroke_width(2));
-            chart.draw_series(line)?;
-        }
-        self.draw_legend(&legend, has_front)?;
+        self.draw_legend(&legend)?;
         Ok(area.present()?)
     }
 
-    fn draw_legend(&self, area: &Area<'_>, has_front: bool) -> Drawn {
+    fn draw_legend(&self, area: &Area<'_>) -> Drawn {
         let mut y = 36;
         for curve in self.curves.iter().filter(|curve| !curve.label.is_empty()) {
             let stroke = colour(curve.series).stroke_width(4);
@@ -175,12 +160,7 @@ impl Figure {
             area.draw(&Text::new(legend_text(curve), (62, y), font(24, HPos::Left)))?;
             y += LEGEND_ROW; // unlabelled curves take no row
         }
-        if has_front {
-            area.draw(&PathElement::new(vec![(0, y), (48, y)], INK.stroke_width(2)))?;
-            area.draw(&Text::new(FRONT, (62, y), font(24, HPos::Left)))?;
-            y += LEGEND_ROW;
-        }
-        if self.is_rising() {
+        if self.curves.iter().flat_map(|curve| &curve.points).any(|point| point.rising) {
             area.draw(&ring((24, y)))?;
             area.draw(&Text::new(RISING, (62, y), font(24, HPos::Left)))?;
         }
