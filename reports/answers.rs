@@ -135,7 +135,7 @@ fn within_bound(comparison: &Comparison<'_>) -> Vec<Vec<Cell>> {
         (
             "fastest",
             |record| TOTAL_SECONDS.of(record),
-            |value| format!("{} s", significant(value, 2)),
+            |value| format!("{} s", significant(value, 3)),
             "its time",
         ),
     ];

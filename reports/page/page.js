@@ -143,7 +143,7 @@ const methodsOf = (methods) => make("dl", {}, ...methods.flatMap(({ id, title, s
 // The methods without a result, and how to add them.
 const notRunOf = ({ methods, command }) => make("div", { class: "notrun" },
   make("p", {}, make("strong", {}, "Not run: "), methods.map(({ id, home }) => home ? `${id} (${home.split(/[,;:.]/)[0].toLowerCase()})` : id).join(", "),
-    ". This command adds them to this page:"), code(command));
+    ". This command adds the missing results to this page:"), code(command));
 
 // A fold whose content is made when it is first opened, or printed.
 const late = (details, build) => {
