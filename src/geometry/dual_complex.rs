@@ -210,8 +210,7 @@ impl DualComplex<'_> {
         self.regular.finite_cells().filter(|&c| self.contains(c))
     }
 
-    /// The triangles, each once, from the cell with the smaller id, in the order of
-    /// [`finite_facets`](crate::triangulation::Triangulation::finite_facets).
+    /// The triangles, each once, from the cell with the smaller id, by ascending facet of that cell.
     pub fn triangles(&self) -> impl Iterator<Item = (Facet, Class)> + '_ {
         let facets = self.regular.finite_cells().filter(|c| self.facets[c.index()] != 0);
         let facets = facets.flat_map(|cell| (0..4).map(move |opposite| Facet { cell, opposite }));
