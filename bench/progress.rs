@@ -5,7 +5,7 @@ use std::io::{self, IsTerminal, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressState, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use medial::simplifier::Progress as Steps;
 use medial_reports::printable;
 
@@ -19,61 +19,90 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// Whether progress is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verbosity {
-    /// Only failures go to standard error.
+    /// Only reasons of missing results go to standard error.
     Quiet,
     /// Progress goes there, too.
     Progress,
 }
 
-/// Progress through a known number of items: a bar on a terminal, else lines.
+/// Progress through a known list of turns of methods: a bar on a terminal, else lines.
 pub struct Progress {
     bar: Option<ProgressBar>,
     verbosity: Verbosity,
-    done: usize,
+    begun: usize,
     total: usize,
+    jobs: usize,
+    /// The methods of the turns that are not done.
+    ahead: Vec<String>,
+    /// The methods of those that are done, with the seconds of each.
+    seen: Vec<(String, f64)>,
 }
 
 impl Progress {
-    /// Progress through `total` items.
-    pub fn new(verbosity: Verbosity, total: usize) -> Self {
+    /// Progress through a turn of each of these methods, of which `jobs` run at the same time.
+    pub fn new(verbosity: Verbosity, turns: Vec<&str>, jobs: usize) -> Self {
         // In a log file a bar would be one long line of control characters.
         let is_drawn = verbosity == Verbosity::Progress && io::stderr().is_terminal();
-        let bar = is_drawn.then(|| ProgressBar::new(total as u64));
+        let bar = is_drawn.then(|| ProgressBar::new(turns.len() as u64));
         if let Some(bar) = &bar {
             let style = ProgressStyle::with_template("{bar:30} {pos}/{len}  {elapsed}  {msg}");
             bar.set_style(style.unwrap_or(ProgressStyle::default_bar()));
             bar.enable_steady_tick(INTERVAL);
         }
-        Self { bar, verbosity, done: 0, total }
+        let ahead: Vec<String> = turns.into_iter().map(str::to_owned).collect();
+        Self { bar, verbosity, begun: 0, total: ahead.len(), jobs, ahead, seen: Vec::new() }
     }
 
-    /// Names the current item.
-    pub fn at(&mut self, what: &str) {
+    /// Names the current mesh and method, and which of how many repetitions begins.
+    pub fn at(&mut self, mesh: &str, method: &str, [turn, of]: [usize; 2]) {
+        let left = estimate(&self.seen, &self.ahead).map_or_else(String::new, |seconds| {
+            let left = Duration::from_secs_f64(seconds / self.jobs as f64);
+            format!(", about {} left", HumanDuration(left))
+        });
+        self.begun += 1;
         match &self.bar {
-            Some(bar) => bar.set_message(printable(what)),
-            None => self.line(&format!("[{}/{}] {what}", self.done + 1, self.total)),
+            Some(bar) => {
+                let turn =
+                    if of > 1 { format!(", repetition {turn} of {of}") } else { String::new() };
+                bar.set_message(printable(&format!("{mesh}: {method}{turn}{left}")));
+            }
+            // One line for each mesh and method.
+            None if turn == 1 && self.verbosity == Verbosity::Progress => {
+                self.remark(&format!("[{}/{}] {mesh}: {method}{left}", self.begun, self.total));
+            }
+            None => {}
         }
     }
 
-    /// One item is done.
-    pub fn done(&mut self) {
-        self.done += 1;
+    /// A turn of a method is done, after some seconds.
+    pub fn done(&mut self, method: &str, seconds: f64) {
+        if let Some(place) = self.ahead.iter().position(|ahead| ahead == method) {
+            self.seen.push((self.ahead.remove(place), seconds));
+        }
         self.bar.iter().for_each(|bar| bar.inc(1));
     }
 
-    /// A remark that stays on the screen.
+    /// A remark that stays on the screen, also where no progress is shown.
     pub fn remark(&self, text: &str) {
         match &self.bar {
             Some(bar) => bar.println(printable(text)),
-            None => self.line(text),
+            None => {
+                let _ = writeln!(io::stderr(), "{}", printable(text));
+            }
         }
     }
+}
 
-    fn line(&self, text: &str) {
-        if self.verbosity == Verbosity::Progress {
-            let _ = writeln!(io::stderr(), "{}", printable(text));
-        }
-    }
+/// Seconds of the turns ahead: for each the mean of its method so far, or of all methods where it had no turn. `None`
+/// before the first turn is done.
+fn estimate(seen: &[(String, f64)], ahead: &[String]) -> Option<f64> {
+    let mean = |of: &dyn Fn(&str) -> bool| {
+        let seconds = seen.iter().filter(|(method, _)| of(method)).map(|(_, seconds)| *seconds);
+        let (number, sum) = seconds.fold((0, 0.0), |(number, sum), s| (number + 1, sum + s));
+        (number > 0).then(|| sum / f64::from(number))
+    };
+    let all = mean(&|_| true)?;
+    Some(ahead.iter().map(|method| mean(&|seen| seen == method).unwrap_or(all)).sum())
 }
 
 impl Drop for Progress {
@@ -150,6 +179,15 @@ fn text(stage: &str, elapsed: Duration, done: u64, total: Option<u64>) -> String
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn turns_ahead_take_as_long_as_those_of_their_method() {
+        let text = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect::<Vec<_>>();
+        let seen = [("qmat".to_owned(), 1.0), ("aof".to_owned(), 20.0), ("qmat".to_owned(), 3.0)];
+        assert_eq!(estimate(&seen[..0], &text(&["qmat"])), None);
+        assert_eq!(estimate(&seen, &text(&["qmat", "aof", "aof"])), Some(42.0));
+        assert_eq!(estimate(&seen, &text(&["hem"])), Some(8.0), "the mean of all");
+    }
 
     #[test]
     fn only_stages_that_last_are_shown() {

@@ -117,7 +117,7 @@ impl Store {
     }
 
     /// The levels of an item that have to be run: levels without a record or whose medial mesh is gone, levels that were
-    /// ended by a limit that is larger now, and failed levels if these are to be retried.
+    /// ended by a limit or skipped by a budget that is larger now, and failed or skipped ones if these are to be retried.
     pub fn missing(&self, item: &Item, retry_failed: bool) -> Vec<Target> {
         (item.levels.iter().zip(item.keys()))
             .filter(|(_, key)| {
@@ -141,8 +141,6 @@ impl Store {
     /// # Errors
     /// When they cannot be written.
     pub fn keep(&mut self, records: &[Record]) -> Result<(), StoreError> {
-        // Before the first line: a page next to more records than it shows would be wrong, however the run ends.
-        remove(&self.dir.join(PAGE))?;
         self.added += records.len();
         Ok(self.journal.append_lines(records)?)
     }
@@ -155,7 +153,10 @@ fn is_incomplete(record: &Record, item: &Item, retry_failed: bool) -> bool {
         // A result that came in time is the same under any limit; one that did not may come under a larger one.
         Status::TimedOut if item.limits.seconds > limits.seconds_limit => true,
         Status::OutOfMemory if item.limits.bytes > limits.bytes_limit => true,
-        status if status.is_failure() => retry_failed,
+        Status::Skipped if item.limits.budget.is_none_or(|budget| Some(budget) > limits.budget) => {
+            true
+        }
+        status if status.is_failure() || status == Status::Skipped => retry_failed,
         // A file is not timed.
         Status::External => false,
         status => status.has_result() && record.repetitions.len() < item.repeat,

@@ -44,7 +44,7 @@ pub use journal::{
     write_records,
 };
 pub use metric::{Better, METRICS, Metric, measured_rows};
-pub use overview::summary_text;
+pub use overview::{reasons, summary_text};
 pub use pictures::{PictureStrip, picture_strips};
 pub use record::{
     Conditions, Initial, Machine, OwnSeconds, Record, Repetition, Simplify, Stages, Status, Target,

@@ -300,7 +300,7 @@ pub(crate) const TOTAL_SECONDS: Metric = Metric::new(
     "time",
     "s",
     (Better::Lower, Digits::Significant, GEOMETRIC),
-    Value::Record(|record| Some(record.simplify.seconds?.total)),
+    Value::Record(|record| Some(record.seconds()?.total)),
 )
 .defined(
     "Wall-clock seconds as if this level had been asked alone: the shared substrates that \

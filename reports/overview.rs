@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::answers::{by_bound, equal_error_table, usual_level};
-use crate::comparison::{Comparison, RISING, RISING_NOTE, reached};
+use crate::comparison::{Comparison, RISING, RISING_NOTE, reached, row_name};
 use crate::header::MethodNote;
 use crate::metric::{HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
 use crate::record::Record;
@@ -133,4 +133,26 @@ fn wrapped(text: &str) -> String {
         used += length;
     }
     lines + "\n"
+}
+
+/// Why levels have no result: a line for all levels of a method on a mesh that have the same reason.
+pub fn reasons(records: &[Record]) -> Vec<String> {
+    let mut missing: Vec<&Record> = records.iter().collect();
+    missing.retain(|record| !record.status.has_result());
+    let is_alike = |a: &&Record, b: &&Record| {
+        (&a.mesh, row_name(a), a.status, &a.reason) == (&b.mesh, row_name(b), b.status, &b.reason)
+    };
+    let line = |alike: &[&Record]| {
+        let Record { mesh, simplify, status, reason, .. } = alike[0];
+        let levels = match alike.len() {
+            1 => simplify.level.to_string(),
+            several => format!("{several} levels"),
+        };
+        let reason = reason.as_deref().unwrap_or("no reason");
+        let status = status.to_string();
+        // Some reasons begin with the status themselves.
+        let begin = if reason.starts_with(&status) { String::new() } else { status + ": " };
+        format!("{mesh}, {}, {levels}: {begin}{reason}", row_name(alike[0]))
+    };
+    missing.chunk_by(is_alike).map(line).collect()
 }

@@ -32,8 +32,10 @@ pub enum Status {
     OtherCount,
     /// No level that was tried keeps the error bound: an answer, not a failure.
     BoundMissed,
-    /// The method does not do this: an answer, not a failure.
+    /// The method does not do this, or leaves nothing at this level: an answer, not a failure.
     Unsupported,
+    /// Not begun, because the method had used up its budget of time on this mesh: not a failure.
+    Skipped,
     /// The input was refused before the method saw it, or by a check of the method's own.
     Refused,
     /// The method returned an error.
@@ -52,12 +54,13 @@ pub enum Status {
 
 impl Status {
     /// Every status, in the order of the enumeration.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Ok,
         Self::External,
         Self::OtherCount,
         Self::BoundMissed,
         Self::Unsupported,
+        Self::Skipped,
         Self::Refused,
         Self::Failed,
         Self::Panicked,
@@ -78,7 +81,7 @@ impl Status {
 
     /// Whether something went wrong: neither a result nor a plain answer that there is none.
     pub fn is_failure(self) -> bool {
-        !self.has_result() && !matches!(self, Self::BoundMissed | Self::Unsupported)
+        !self.has_result() && !matches!(self, Self::BoundMissed | Self::Unsupported | Self::Skipped)
     }
 
     /// The word that stands in the JSON.
@@ -89,6 +92,7 @@ impl Status {
             Self::OtherCount => "other_count",
             Self::BoundMissed => "bound_missed",
             Self::Unsupported => "unsupported",
+            Self::Skipped => "skipped",
             Self::Refused => "refused",
             Self::Failed => "failed",
             Self::Panicked => "panicked",
@@ -182,6 +186,18 @@ pub struct Record {
     pub artifact: Option<String>,
 }
 
+impl Record {
+    /// Whether no other item of the run disturbed the seconds: only such seconds compare.
+    pub(crate) fn ran_alone(&self) -> bool {
+        self.conditions.as_ref().is_none_or(|conditions| conditions.jobs <= 1)
+    }
+
+    /// Wall-clock seconds by stage, of a run that nothing disturbed.
+    pub(crate) fn seconds(&self) -> Option<Stages> {
+        self.simplify.seconds.filter(|_| self.ran_alone())
+    }
+}
+
 /// The `simplify` object: one method at one level.
 ///
 /// Only what was asked is always there; the rest is absent where the run did not get so far.
@@ -267,9 +283,20 @@ pub struct Conditions {
     pub seconds_limit: f64,
     /// Limit of memory, in bytes.
     pub bytes_limit: u64,
+    /// Budget of time of the method on this mesh, in seconds, where it had one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub budget: Option<f64>,
+    /// Number of items that ran at the same time.
+    #[serde(default = "one_job")]
+    pub jobs: usize,
     /// Hash of the declaration and the files of a plug-in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fingerprint: Option<String>,
+}
+
+/// Records of older builds ran alone.
+fn one_job() -> usize {
+    1
 }
 
 /// Seconds by stage.

@@ -141,7 +141,7 @@ def run(paper, name, number, options):
     folder = options.out / f"{name}-{number}"
     study = options.out / f"{name}-{number}.toml"
     options.out.mkdir(parents=True, exist_ok=True)
-    study.write_text(f"meshes = ['{source}']\ntimeout = 3600\ncounts_only = true\n{sampling}"
+    study.write_text(f"meshes = ['{source}']\ntimeout = 3600\nbudget = 3600\ncounts_only = true\n{sampling}"
                      + paper["study"] + methods)
     print(f"{name}: {label}", file=sys.stderr)
     command = [options.medial, "compare", "--study", study, "--out", folder, "--quiet"]

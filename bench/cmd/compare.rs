@@ -1,10 +1,11 @@
 //! `medial compare [MESH ...]`: the main job. Methods x meshes x levels, measured and reported.
 
-use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::collections::{HashMap, HashSet};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use clap::Args;
-use medial_reports::{Record, Status, read_header};
+use medial_reports::{Record, Running, Status, read_header, reasons};
 use serde_json::json;
 
 use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
@@ -14,9 +15,9 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_line};
 use crate::provenance::Provenance;
-use crate::rebuild::{self, Rebuilt};
+use crate::rebuild::{Rebuilt, RunReport, write_study};
 use crate::store::{AXES, PAGE, RESULTS, Store};
-use crate::study::external::Given;
+use crate::study::external::{GIVEN, Given};
 use crate::study::item::Item;
 use crate::study::registry::Registry;
 use crate::study::source::Source;
@@ -25,8 +26,8 @@ use crate::study::{Study, StudyMethod, shard};
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface files (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME` [default: the built-in shapes that
-    /// `datasets list` says].
+    /// Surface files (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME` [default: three built-in shapes,
+    /// `bracket`, `torus` and `blob`; `--dataset builtin` runs all].
     meshes: Vec<MeshArgument>,
     /// A set of meshes beside those named: `builtin`, `public`, `defective`, `small`, `papers`, a package as in
     /// `deb:libcgal-demo`, or the name of one mesh; can be given several times.
@@ -39,7 +40,7 @@ pub struct Arguments {
     /// [default: all but those that run on request].
     #[arg(long, value_name = "ID[:KEY=VALUE]", value_delimiter = ',')]
     methods: Vec<String>,
-    /// Sphere counts, separated by commas [default: 1000,500,200,100].
+    /// Sphere counts, separated by commas [default: 500,200,100].
     #[arg(long, value_name = "COUNTS", value_delimiter = ',')]
     spheres: Vec<usize>,
     /// Levels of a method's own beside the counts, in place of its default sweep; can be given
@@ -86,7 +87,16 @@ pub struct Arguments {
     /// End an item after so many seconds [default: 300].
     #[arg(long, value_name = "SECONDS")]
     timeout: Option<f64>,
-    /// End an item that needs more megabytes [default: three quarters of the machine's].
+    /// Begin no further level of a method on a mesh after so many seconds: such levels are `skipped` [default: 60].
+    #[arg(long, value_name = "SECONDS")]
+    budget: Option<f64>,
+    /// Run N items at the same time; their seconds stand in no table [default: 1].
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+    /// Exit with 3 when any result is not as requested, not only after failures.
+    #[arg(long)]
+    strict: bool,
+    /// End an item that needs more megabytes [default: three quarters of the machine's, shared by the jobs].
     #[arg(long, value_name = "MB")]
     memory: Option<u64>,
     /// Certify each Hausdorff error by an interval of this width, a fraction of the diagonal.
@@ -122,15 +132,17 @@ pub fn run(
     }
     let axes = Some(arguments.out.join(AXES));
     let store = Store::open(&arguments.out, RESULTS, &provenance.command)?;
-    let supervisor = Supervisor::new(registry.files(), &provenance, axes, interrupt::listen());
+    let interrupted = interrupt::listen();
+    let supervisor = || Supervisor::new(registry.files(), &provenance, axes.clone(), interrupted);
+    let supervisors = (0..study.jobs).map(|_| supervisor()).collect();
     store.remarks.iter().for_each(|remark| note(global, remark));
-    let mut side = Contender { build: None, supervisor, store };
-    let (left, found) = match arguments.fresh {
+    let mut side = Contender { supervisors, store };
+    let (mut left, found) = match arguments.fresh {
         true => (items.clone(), 0),
         false => missing(&items, &side.store, arguments.retry_failed),
     };
     // Before anything is cleared: a misspelt parameter must not cost earlier results.
-    if let Some(why) = refused_params(&left, &mut side.supervisor)? {
+    if let Some(why) = refused_params(&left, &mut side.supervisors[0])? {
         return Err(Failure::usage(why));
     }
     // No result is touched before this line.
@@ -138,13 +150,35 @@ pub fn run(
         side.store.clear(RESULTS)?;
     }
     if !left.is_empty() {
-        rebuild::write_study(&arguments.out, &study)?;
+        write_study(&arguments.out, &study)?;
     }
-    let ended = run_items(&left, std::slice::from_mut(&mut side), global.progress());
+    // Mesh by mesh from cheap to dear, so that there is something to see soon.
+    for scene in left.chunk_by_mut(|a, b| a.scene == b.scene) {
+        scene.sort_by_key(|item| match item.method.id.as_str() {
+            GIVEN => 0,
+            id => medial_methods::cost_rank(id),
+        });
+    }
+    let levels: usize = left.iter().map(|item| item.levels.len()).sum();
+    let (dir, registry) = (&arguments.out, &*registry);
+    let adds = levels > 0;
+    let report = RunReport { dir, registry, provenance: &provenance, items: &items, adds };
+    let due = PAUSES.map(|pause| Instant::now() + pause);
+    let running = Running { total: methods_of(&items).len(), ..Running::default() };
+    let mut pages = Pages { report: &report, running, due };
+    if adds && dir.join(PAGE).exists() {
+        // An earlier page must not pass for one of all records, however this run ends.
+        pages.write(&left.iter().collect::<Vec<_>>());
+    }
+    let mut on_kept = |waiting: &[&Item]| pages.write(waiting);
+    let sides = std::slice::from_mut(&mut side);
+    let ended = run_items(&left, sides, global.progress(), &mut on_kept);
     let run = side.store.added;
     // Nothing looks at the flag from here on.
     if interrupt::stop_listening() || matches!(ended, Err(RunError::Interrupted)) {
-        let levels: usize = left.iter().map(|item| item.levels.len()).sum();
+        if run > 0 {
+            report.write(Some(pages.running), false)?;
+        }
         print_error(&format!(
             "interrupted: {run} of {levels} results were made and are kept; the same command goes on from there"
         ));
@@ -152,11 +186,52 @@ pub fn run(
     }
     ended?;
     // The store stays locked until its report is written; a worker would only hold memory.
-    side.supervisor.renew();
-    let Rebuilt { records, files, undrawn, .. } =
-        rebuild::refresh(&arguments.out, registry, &provenance, run)?;
+    side.supervisors.clear();
+    let Rebuilt { records, files, undrawn, .. } = report.write(None, true)?;
     undrawn.iter().for_each(|why| note(global, why));
-    finish(&of_items(records, &items), [run, found], &arguments.out, &files, global)
+    let records = of_items(records, &items);
+    let told: HashSet<String> = left.iter().flat_map(Item::keys).collect();
+    // Those of this run are on the screen.
+    let earlier: Vec<Record> =
+        records.iter().filter(|record| !told.contains(&record.key)).cloned().collect();
+    reasons(&earlier).iter().for_each(|reason| print_error(reason));
+    finish(&records, [run, found], arguments, &files, global)
+}
+
+/// The methods of some items, each once.
+fn methods_of<'i>(items: impl IntoIterator<Item = &'i Item>) -> Vec<String> {
+    let mut seen = HashSet::new();
+    let labels = items.into_iter().map(|item| item.method.label().to_owned());
+    labels.filter(|label| seen.insert(label.clone())).collect()
+}
+
+/// The pages of a run that goes on. They take at most about a tenth of its time.
+struct Pages<'r> {
+    report: &'r RunReport<'r>,
+    /// What stands on the next page.
+    running: Running,
+    /// When the next page is due, and the next one with new pictures.
+    due: [Instant; 2],
+}
+
+/// The least time between two pages, and between two with new pictures.
+const PAUSES: [Duration; 2] = [Duration::ZERO, Duration::from_secs(10)];
+
+impl Pages<'_> {
+    /// Writes a page that names the waiting items, if one is due. The last page is that of the whole run.
+    fn write(&mut self, waiting: &[&Item]) {
+        let (begun, running) = (Instant::now(), &mut self.running);
+        running.missing = methods_of(waiting.iter().copied());
+        running.done = running.total - running.missing.len();
+        if waiting.is_empty() || begun < self.due[0] {
+            return;
+        }
+        let draws = begun >= self.due[1];
+        // A fault of the folder ends the run where records or the last page meet it.
+        let _ = self.report.write(Some(running.clone()), draws);
+        let kind = usize::from(draws);
+        self.due[kind] = Instant::now() + PAUSES[kind].max(10 * begun.elapsed());
+    }
 }
 
 /// The study that the command line asks for, on top of the file where one is given.
@@ -191,6 +266,8 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     study.published |= arguments.published;
     study.repeat = arguments.repeat.unwrap_or(study.repeat);
     study.timeout = arguments.timeout.unwrap_or(study.timeout);
+    study.budget = arguments.budget.unwrap_or(study.budget);
+    study.jobs = arguments.jobs.unwrap_or(study.jobs);
     study.memory = arguments.memory.or(study.memory);
     study.certify = arguments.certify.or(study.certify);
     study.threads = global.threads.or(study.threads);
@@ -275,11 +352,12 @@ fn of_items(records: Vec<Record>, items: &[Item]) -> Vec<Record> {
 fn finish(
     records: &[Record],
     [run, found]: [usize; 2],
-    out: &Path,
+    arguments: &Arguments,
     files: &[PathBuf],
     global: &Global,
 ) -> Result<Exit, Failure> {
     let ok = records.iter().filter(|record| record.status.is_ok()).count();
+    let out = &arguments.out;
     let page = out.join(PAGE);
     if global.json {
         let by_status: serde_json::Map<String, serde_json::Value> =
@@ -309,6 +387,7 @@ fn finish(
     Ok(match measured {
         0 => Exit::NothingMeasured,
         _ if records.iter().any(|record| record.status.is_failure()) => Exit::SomeFailed,
+        _ if arguments.strict && ok < records.len() => Exit::SomeFailed,
         _ => Exit::Done,
     })
 }

@@ -189,7 +189,7 @@ fn list_all(global: &Global) -> Result<Exit, Failure> {
         ));
     }
     let in_default = shapes.iter().filter(|shape| shape.in_default).count();
-    print_line(&format!("compare takes the first {in_default} where no mesh is named"));
+    print_line(&format!("compare --dataset builtin takes the first {in_default}"));
     for set in Set::ALL {
         print_set(set, &states);
     }

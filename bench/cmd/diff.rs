@@ -123,6 +123,8 @@ fn alternate(
     study.repeat = arguments.repeat;
     // The CPU seconds of several threads that wait for each other vary too much.
     study.threads = global.threads.or(study.threads).or(Some(1));
+    // Which levels a budget skips depends on the machine's load: the limit of time alone holds.
+    study.budget = study.timeout;
     for file in &study.plugins {
         registry.add_plugins(&study.resolved(file)).map_err(Failure::usage)?;
     }
@@ -143,14 +145,16 @@ fn alternate(
         let axes = Some(folder.join(AXES));
         let supervisor = Supervisor::new(registry.files(), &build.provenance, axes, interrupted);
         let supervisor = supervisor.of_program(&build.program);
-        sides.push(Contender { build: Some(build), supervisor, store });
+        sides.push(Contender { supervisors: vec![supervisor], store });
     }
     let mut left = items.clone();
     // Both sides again where one lacks a level: seconds compare only within one session.
     left.retain(|item| {
-        sides.iter().any(|side| !side.store.missing(&side.own(item), false).is_empty())
+        sides
+            .iter()
+            .any(|side| !side.store.missing(&side.supervisors[0].own(item), false).is_empty())
     });
-    let ended = run_items(&left, &mut sides, global.progress());
+    let ended = run_items(&left, &mut sides, global.progress(), &mut |_| ());
     if interrupt::stop_listening() || matches!(ended, Err(RunError::Interrupted)) {
         print_error("interrupted: what was finished is kept; the same command goes on from there");
         return Ok(None);
@@ -167,7 +171,7 @@ fn requested_records(
     items: &[Item],
     global: &Global,
 ) -> Result<Vec<Record>, Failure> {
-    let keys = items.iter().flat_map(|item| contender.own(item).keys());
+    let keys = items.iter().flat_map(|item| contender.supervisors[0].own(item).keys());
     let keys: HashSet<String> = keys.collect();
     let mut records = some_records(contender.store.dir(), global)?;
     records.retain(|record| keys.contains(&record.key));

@@ -14,7 +14,6 @@ use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::files;
 use crate::output::{print_json, print_line};
-use crate::provenance::Provenance;
 use crate::rebuild::{Rebuilt, STUDY, rebuild, records, write_study};
 use crate::store::{PAGE, RESULTS, Store, artifact_path};
 use crate::study::Study;
@@ -42,7 +41,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         (_, None) => {
             return Err(Failure::usage("several stores: name the merged one by --out DIR"));
         }
-        (dirs, Some(out)) => (out, merge(dirs, out, registry)?),
+        (dirs, Some(out)) => (out, merge(dirs, out)?),
     };
     // While records are being added, no page would match them.
     let held = dir.is_dir().then(|| Store::open(dir, RESULTS, "medial report")).transpose()?;
@@ -65,7 +64,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
 /// Merges stores into `out`: records with their medial meshes, the study, the notes of the runs. Of
 /// records of the same key the first counts if they are equal but for seconds, else the one of the
 /// store that was written last. Returns a remark for each such difference.
-fn merge(dirs: &[PathBuf], out: &Path, registry: &Registry) -> Result<Vec<String>, Failure> {
+fn merge(dirs: &[PathBuf], out: &Path) -> Result<Vec<String>, Failure> {
     let mut stores = Vec::new();
     // What stands in `out` already takes part like another store.
     let earlier = out.join(RESULTS).exists().then(|| out.to_owned());
@@ -149,11 +148,7 @@ fn merge(dirs: &[PathBuf], out: &Path, registry: &Registry) -> Result<Vec<String
         }
         write_study(out, study)?;
     }
-    let order = studies.first().and_then(|(_, study)| order_of(study, registry));
-    let order = order.unwrap_or_default();
-    let mut records: Vec<Record> = merged.into_iter().map(|(record, ..)| record).collect();
-    // Tables follow the order of the records: that of the study, as if one process had run it all.
-    records.sort_by_key(|record| order.get(&row_of(record)).copied().unwrap_or(usize::MAX));
+    let records: Vec<Record> = merged.into_iter().map(|(record, ..)| record).collect();
     write_records(&out.join(RESULTS), &records).map_err(Failure::input)?;
     let mut header = Header::default();
     for dir in earlier.iter().chain(dirs) {
@@ -175,22 +170,4 @@ fn merge(dirs: &[PathBuf], out: &Path, registry: &Registry) -> Result<Vec<String
 fn is_same(a: &Record, b: &Record) -> bool {
     (a.status, &a.result_hash, &a.evaluate, &a.mesh_hash)
         == (b.status, &b.result_hash, &b.evaluate, &b.mesh_hash)
-}
-
-/// What tells the place of a record in its study: mesh, method with parameters, level.
-fn row_of(record: &Record) -> String {
-    let Record { mesh, simplify, .. } = record;
-    json!([mesh, simplify.method, simplify.variant, simplify.params, simplify.level]).to_string()
-}
-
-/// The place of each row of a study; `None` where its meshes or plug-ins are not at hand.
-fn order_of(study: &Study, registry: &Registry) -> Option<HashMap<String, usize>> {
-    let items = study.items(registry, &Provenance::here()).ok()?;
-    let rows = items.iter().flat_map(|item| {
-        let method = &item.method;
-        item.levels.iter().map(move |level| {
-            json!([item.scene.mesh, method.id, method.name, method.params, level]).to_string()
-        })
-    });
-    Some(rows.enumerate().map(|(place, row)| (row, place)).collect())
 }

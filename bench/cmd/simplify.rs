@@ -21,7 +21,7 @@ use crate::args::{
 };
 use crate::exit::{Exit, Failure};
 use crate::files::{COINCIDENT, SURFACES, check_extension, check_folder, check_output, shape_of};
-use crate::measure::answer::{Bounds, Fault, LevelRun, answer, preparing};
+use crate::measure::answer::{Bounds, Budget, Fault, LevelRun, answer, preparing};
 use crate::measure::search::Found;
 use crate::measure::{fill_costs, fill_result};
 use crate::output::{counted, print_json, print_line, version};
@@ -169,6 +169,7 @@ impl Arguments {
         let context = RunContext::with_seed(seed).on_progress(line.steps());
         let info = entry.method().info();
         let prepare = preparing(|view| entry.method().prepare(view, params, &context));
+        let budget = Budget::from_now(None);
         line.at(format!("preparing {}", self.method));
         let Some(bound) = self.max_error else {
             let level = match (self.spheres, self.level) {
@@ -178,7 +179,7 @@ impl Arguments {
             };
             let at = |level| line.at(format!("simplifying to {level} by {}", self.method));
             let view = shape.view();
-            let run = answer(&view, info, || prepare(&view), &[level], at).pop();
+            let run = answer(&view, info, || prepare(&view), &[level], &budget, at).pop();
             return Ok((run.expect("one level, one run"), None));
         };
         let judge = shape.judge(input.axis.as_ref(), self.measure.judge_options(seed));
@@ -199,6 +200,7 @@ impl Arguments {
             sweep: &entry.presentation().sweep,
             prepare: &prepare,
             measure: &measure,
+            budget: &budget,
             searching: &|_| {},
             trying: &|level| line.at(format!("searching the bound: {level}")),
         };

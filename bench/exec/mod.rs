@@ -97,6 +97,16 @@ impl<'a> Supervisor<'a> {
         }
     }
 
+    /// An item as these workers have to run it.
+    pub fn own(&self, item: &Item) -> Item {
+        if self.program.is_none() {
+            return item.clone();
+        }
+        // Two builds are compared as such: the version of a method is not known of another program.
+        let binary = self.provenance.binary_hash.clone();
+        Item { version: binary.clone(), binary, ..item.clone() }
+    }
+
     /// The same with workers of another build of the program.
     pub fn of_program(self, program: &Path) -> Self {
         Self { program: Some(program.to_owned()), ..self }
@@ -115,7 +125,7 @@ impl<'a> Supervisor<'a> {
     /// # Errors
     /// When the user interrupts, or no worker can be started.
     pub fn run(&mut self, item: &Item) -> Result<Vec<Record>, RunError> {
-        let mut kept: Vec<Record> = Vec::new();
+        let (item, mut kept): (_, Vec<Record>) = (&self.own(item), Vec::new());
         // A stack: groups that are split off run before later ones, from fine to coarse.
         let mut groups = vec![item.levels.clone()];
         while let Some(levels) = groups.pop() {
@@ -170,12 +180,22 @@ impl<'a> Supervisor<'a> {
         Ok(kept)
     }
 
-    /// Times all levels of an item once more.
+    /// Times all levels of an item that have a result once more.
     ///
     /// # Errors
     /// As [`Supervisor::run`].
-    pub fn again(&mut self, item: &Item) -> Result<Result<Vec<Repeated>, Fault>, RunError> {
-        let request = Request::Again { item: item.clone() };
+    pub fn again(
+        &mut self,
+        item: &Item,
+        first: &[Record],
+    ) -> Result<Result<Vec<Repeated>, Fault>, RunError> {
+        let mut item = item.clone();
+        // Whether a level is begun is decided once.
+        item.limits.budget = None;
+        item.levels.retain(|&level| {
+            first.iter().any(|record| record.simplify.level == level && record.status.has_result())
+        });
+        let request = Request::Again { item };
         let mut repeated = Vec::new();
         let attempt = self.converse(&request, &mut |event| {
             if let Event::Repeated(level, outcome) = event {

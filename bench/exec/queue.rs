@@ -5,11 +5,14 @@
 //! changes its speed by more than many a regression. Within a repetition the two sides follow each other item by
 //! item, and the side that begins changes from repetition to repetition.
 
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::{fs, io};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+use std::{fs, io, thread};
 
-use medial_reports::{Record, Status};
+use medial_reports::{Record, Status, reasons};
 
 use crate::exec::{RunError, Supervisor, merge};
 use crate::measure::median;
@@ -57,99 +60,130 @@ pub fn refused_params(
 /// items of one scene take turns, so that a slow minute of the machine does not affect one method
 /// alone; then their records are kept after the last turn.
 ///
+/// As many items run at the same time as each side has supervisors. `on_kept` gets the items that are still to be run
+/// whenever one is kept. Nothing else is timed meanwhile with one supervisor.
+///
 /// # Errors
 /// When the user interrupts, no worker can be started, or records cannot be kept.
 pub fn run_items(
     items: &[Item],
     sides: &mut [Contender<'_>],
     verbosity: Verbosity,
+    on_kept: &mut (dyn FnMut(&[&Item]) + Send),
 ) -> Result<(), RunError> {
-    let turns = items.iter().map(|item| item.repeat.max(1)).sum();
-    let mut progress = Progress::new(verbosity, turns);
-    // A worker keeps the substrates of one scene only.
-    for scene in items.chunk_by(|a, b| a.scene == b.scene) {
-        let mut waiting: Vec<(&Item, Vec<Vec<Record>>)> = Vec::new();
-        for (place, item) in scene.iter().enumerate() {
-            progress.at(&format!("{}: {}", item.scene.mesh, item.method.label()));
-            let mut kept = vec![vec![]; sides.len()];
-            for side in order(place, sides.len()) {
-                kept[side] = sides[side].supervisor.run(&sides[side].own(item))?;
-                failures(&kept[side]).iter().for_each(|remark| progress.remark(remark));
-            }
-            progress.done();
-            match item.repeat {
-                0 | 1 => keep(sides, kept)?,
-                _ => waiting.push((item, kept)),
-            }
+    let (mut lanes, mut stores): (Vec<Lane<'_, '_>>, _) = (Vec::new(), Vec::new());
+    for Contender { supervisors, store } in sides {
+        stores.push(store);
+        lanes.resize_with(supervisors.len(), Vec::new);
+        lanes.iter_mut().zip(supervisors).for_each(|(lane, supervisor)| lane.push(supervisor));
+    }
+    let takes_turns = |a: &Item, b: &Item| a.scene == b.scene && a.repeat > 1 && b.repeat > 1;
+    let turns = items.iter().flat_map(|item| vec![item.method.label(); item.repeat.max(1)]);
+    let desk = Mutex::new(Desk {
+        jobs: lanes.len(),
+        batches: items.chunk_by(takes_turns).enumerate().collect(),
+        waiting: items.iter().collect(),
+        stores,
+        progress: Progress::new(verbosity, turns.collect(), lanes.len()),
+        on_kept,
+    });
+    thread::scope(|scope| {
+        let lanes: Vec<_> =
+            lanes.iter_mut().map(|lane| scope.spawn(|| work(lane, &desk))).collect();
+        let ended = lanes.into_iter().map(|lane| lane.join().expect("a lane does not panic"));
+        // All are waited for, and the first error counts.
+        ended.collect::<Vec<_>>().into_iter().collect()
+    })
+}
+
+/// One supervisor of each side.
+type Lane<'s, 'a> = Vec<&'s mut Supervisor<'a>>;
+
+/// What the lanes share.
+struct Desk<'d> {
+    jobs: usize,
+    /// Items that take turns, with the number of the batch.
+    batches: VecDeque<(usize, &'d [Item])>,
+    /// Items that are not kept.
+    waiting: Vec<&'d Item>,
+    stores: Vec<&'d mut Store>,
+    progress: Progress,
+    on_kept: &'d mut (dyn FnMut(&[&Item]) + Send),
+}
+
+fn lock<'m, 'd>(desk: &'m Mutex<Desk<'d>>) -> MutexGuard<'m, Desk<'d>> {
+    desk.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Runs batches until there are none.
+fn work(lane: &mut Lane<'_, '_>, desk: &Mutex<Desk<'_>>) -> Result<(), RunError> {
+    loop {
+        let Some((number, batch)) = lock(desk).batches.pop_front() else { return Ok(()) };
+        let ended = run_batch(number, batch, lane, desk);
+        let mut desk = lock(desk);
+        if let Err(error) = ended.and_then(|kept| Ok(desk.keep(batch, kept)?)) {
+            // The other lanes end after the items that they are at.
+            desk.batches.clear();
+            return Err(error);
         }
-        let turns = waiting.iter().map(|(item, _)| item.repeat).max().unwrap_or(1);
-        for turn in 2..=turns {
-            if sides.len() > 1 {
-                sides.iter_mut().for_each(|side| side.supervisor.renew());
-            }
-            for (place, (item, kept)) in waiting.iter_mut().enumerate() {
-                let (mesh, method) = (&item.scene.mesh, item.method.label());
-                progress.at(&format!("{mesh}: {method}, repetition {turn} of {}", item.repeat));
-                for side in order(place + turn, sides.len()) {
-                    let has_result = kept[side].iter().any(|r| r.status.has_result());
-                    if turn <= item.repeat && has_result {
-                        let again = sides[side].supervisor.again(&sides[side].own(item))?;
-                        merge(&mut kept[side], turn, again);
-                    }
+    }
+}
+
+/// Runs the items of a batch on each side, as often as each is repeated: their records by item and side.
+fn run_batch(
+    number: usize,
+    batch: &[Item],
+    lane: &mut Lane<'_, '_>,
+    desk: &Mutex<Desk<'_>>,
+) -> Result<Vec<Vec<Vec<Record>>>, RunError> {
+    let mut kept = vec![vec![vec![]; lane.len()]; batch.len()];
+    for turn in 1..=batch[0].repeat.max(1) {
+        if turn > 1 && lane.len() > 1 {
+            lane.iter_mut().for_each(|supervisor| supervisor.renew());
+        }
+        for (place, (item, kept)) in batch.iter().zip(&mut kept).enumerate() {
+            lock(desk).progress.at(&item.scene.mesh, item.method.label(), [turn, item.repeat]);
+            let begun = Instant::now();
+            // Each side begins as often as the others: the second one finds files in the cache of the system.
+            let first = number + place + turn;
+            let sides = lane.len();
+            for side in (0..sides).map(|side| (side + first) % sides) {
+                let kept = &mut kept[side];
+                if turn == 1 {
+                    *kept = lane[side].run(item)?;
+                    let remarks = reasons(kept);
+                    remarks.iter().for_each(|remark| lock(desk).progress.remark(remark));
+                } else if kept.iter().any(|record| record.status.has_result()) {
+                    let again = lane[side].again(item, kept)?;
+                    merge(kept, turn, again);
                 }
-                progress.done();
             }
-        }
-        for (_, kept) in waiting {
-            keep(sides, kept)?;
+            lock(desk).progress.done(item.method.label(), begun.elapsed().as_secs_f64());
         }
     }
-    Ok(())
+    Ok(kept)
 }
 
-/// The sides in the order of a turn.
-// Each begins as often as the others: the second one finds files in the cache of the system.
-fn order(turn: usize, sides: usize) -> impl Iterator<Item = usize> {
-    (0..sides).map(move |side| (side + turn) % sides)
-}
-
-/// Keeps the records of each side, with their seconds replaced by those of the median repetition.
-fn keep(sides: &mut [Contender<'_>], kept: Vec<Vec<Record>>) -> Result<(), StoreError> {
-    for (side, mut records) in sides.iter_mut().zip(kept) {
-        for record in &mut records {
-            if let Some(seconds) = median(&record.repetitions, |r| r.seconds) {
-                record.simplify.seconds = Some(seconds);
-                record.simplify.cpu_seconds = median(&record.repetitions, |r| r.cpu_seconds);
+impl Desk<'_> {
+    /// Keeps the records of a batch, with their seconds replaced by those of the median repetition.
+    fn keep(&mut self, batch: &[Item], kept: Vec<Vec<Vec<Record>>>) -> Result<(), StoreError> {
+        for (item, sides) in batch.iter().zip(kept) {
+            for (store, mut records) in self.stores.iter_mut().zip(sides) {
+                for record in &mut records {
+                    if let Some(seconds) = median(&record.repetitions, |r| r.seconds) {
+                        record.simplify.seconds = Some(seconds);
+                        record.simplify.cpu_seconds =
+                            median(&record.repetitions, |r| r.cpu_seconds);
+                    }
+                    record.conditions.iter_mut().for_each(|conditions| conditions.jobs = self.jobs);
+                }
+                store.keep(&records)?;
             }
+            self.waiting.retain(|other| !std::ptr::eq(*other, item));
+            (self.on_kept)(&self.waiting);
         }
-        side.store.keep(&records)?;
+        Ok(())
     }
-    Ok(())
-}
-
-/// One remark for each failure, or a single one if all levels failed for the same reason.
-fn failures(records: &[Record]) -> Vec<String> {
-    let failed: Vec<&Record> = records.iter().filter(|r| r.status.is_failure()).collect();
-    // A refused mesh fails at every level for one reason: one line is enough.
-    let alike = failed.len() == records.len()
-        && failed.iter().all(|r| r.status == failed[0].status && r.reason == failed[0].reason);
-    let shown = if alike { 1 } else { failed.len() };
-    let mut remarks = Vec::new();
-    for record in failed.into_iter().take(shown) {
-        let Record { mesh, simplify, status, reason, .. } = record;
-        let reason = reason.as_deref().unwrap_or("no reason");
-        let level = match records.len() {
-            2.. if alike => "all levels".to_owned(),
-            _ => simplify.level.to_string(),
-        };
-        let method = simplify.variant.as_ref().unwrap_or(&simplify.method);
-        // Some reasons begin with the status themselves.
-        let status = status.to_string();
-        let status =
-            if reason.starts_with(&status) { String::new() } else { format!("{status}: ") };
-        remarks.push(format!("{mesh}, {method}, {level}: {status}{reason}"));
-    }
-    remarks
 }
 
 /// How many records have a status.
@@ -197,20 +231,8 @@ impl Build {
 
 /// A side of a run: a program with its workers and its store.
 pub struct Contender<'a> {
-    /// The build, where it is another program than the running one.
-    pub build: Option<Build>,
-    /// Its supervisor, whose workers are of this build.
-    pub supervisor: Supervisor<'a>,
+    /// Its supervisors, whose workers are of one build: as many items run at the same time.
+    pub supervisors: Vec<Supervisor<'a>>,
     /// Where its records are kept.
     pub store: Store,
-}
-
-impl Contender<'_> {
-    /// An item as this side has to run it.
-    pub fn own(&self, item: &Item) -> Item {
-        let Some(build) = &self.build else { return item.clone() };
-        // Two builds are compared as such: the version of a method is not known of another program.
-        let binary = build.provenance.binary_hash.clone();
-        Item { version: binary.clone(), binary, ..item.clone() }
-    }
 }

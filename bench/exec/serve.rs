@@ -20,7 +20,7 @@ use medial_reports::{Record, Status};
 
 use crate::check::{Outcome, Subject};
 use crate::exec::protocol::{CheckItem, Event, Request, send};
-use crate::measure::answer::{Bounds, Fault, LevelRun, answer, panic_message, preparing};
+use crate::measure::answer::{Bounds, Budget, Fault, LevelRun, answer, panic_message, preparing};
 use crate::measure::{Scene, failure_record, judge, mesh_hash, record, repetition};
 use crate::plugin::SCRATCH;
 use crate::provenance::Provenance;
@@ -134,12 +134,13 @@ fn run(
         Ok(entry) => entry.method().prepare(view, &item.method.params, &context),
         Err(why) => Err(SimplifyError::Failed(why.clone())),
     });
+    let budget = Budget::from_now(item.limits.budget);
     let levels: Vec<Level> = item.levels.iter().filter_map(|target| target.level().ok()).collect();
     if !levels.is_empty() {
         let view = scene.shape().view();
         // The supervisor notices by itself when the pipe is closed.
         let asked = |level: Level| drop(send(&Event::Asked(level.into())));
-        report(scene, answer(&view, info, || prepare(&view), &levels, asked))?;
+        report(scene, answer(&view, info, || prepare(&view), &levels, &budget, asked))?;
     }
     let mut bounds: Vec<f64> =
         item.levels.iter().filter_map(|target| target.level().err()).collect();
@@ -158,6 +159,7 @@ fn run(
         sweep: entry.as_ref().map_or(&[], |entry| &entry.presentation().sweep),
         prepare: &prepare,
         measure: &measure,
+        budget: &budget,
         searching: &|bound| drop(send(&Event::Asked(bound))),
         trying: &|_| {},
     };

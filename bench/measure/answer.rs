@@ -5,7 +5,9 @@
 //! Measuring and writing come later and are not timed.
 
 use std::any::Any;
+use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Instant;
 
 use medial::heap::Usage;
 use medial::shape::{Cost, Shape, Substrate};
@@ -82,8 +84,34 @@ impl From<SimplifyError> for Fault {
     }
 }
 
-/// Starts a simplification on a view of a shape and computes every level, given from fine to coarse
-/// within each kind. `on_level` gets each level before it is computed.
+/// The time that the levels of a method may use together: once it is used up, no further level is begun.
+pub struct Budget {
+    begun: Instant,
+    /// Seconds; `None` without a limit.
+    seconds: Option<f64>,
+    /// Whether a level was computed: the first one always is.
+    has_level: Cell<bool>,
+}
+
+impl Budget {
+    /// A budget of some seconds from now on.
+    pub fn from_now(seconds: Option<f64>) -> Self {
+        Self { begun: Instant::now(), seconds, has_level: Cell::new(false) }
+    }
+
+    /// Why no further level is begun.
+    fn used_up(&self) -> Option<Fault> {
+        let (used, seconds) = (self.begun.elapsed().as_secs_f64(), self.seconds?);
+        (self.has_level.get() && used > seconds).then(|| {
+            let reason =
+                format!("not run: the method had used the {seconds} s of --budget on this mesh");
+            Fault { status: Status::Skipped, reason }
+        })
+    }
+}
+
+/// Starts a simplification on a view of a shape and computes every level as long as the budget lasts, the first
+/// one always. `on_level` gets each level before it is computed.
 ///
 /// The seconds of a level are those of its call alone. Where `info` declares the method incremental,
 /// they are those of all calls since the preparation; levels of another kind, and a finer level after
@@ -95,6 +123,7 @@ pub fn answer<'s>(
     info: &MethodInfo,
     start: impl Fn() -> Result<Box<dyn Simplification + 's>, SimplifyError>,
     levels: &[Level],
+    budget: &Budget,
     on_level: impl Fn(Level),
 ) -> Vec<LevelRun> {
     let mut runs = Vec::new();
@@ -111,7 +140,14 @@ pub fn answer<'s>(
             .count();
         // All that one preparation can serve, charged as one run of growing length.
         let (together, others) = rest.split_at(count);
-        runs.extend(of_one_preparation(view, info.incremental, &start, together, &on_level));
+        runs.extend(of_one_preparation(
+            view,
+            info.incremental,
+            &start,
+            together,
+            budget,
+            &on_level,
+        ));
         rest = others;
     }
     runs
@@ -135,10 +171,12 @@ fn of_one_preparation<'s>(
     is_incremental: bool,
     start: impl FnOnce() -> Result<Box<dyn Simplification + 's>, SimplifyError>,
     levels: &[Level],
+    budget: &Budget,
     on_level: impl Fn(Level),
 ) -> Vec<LevelRun> {
     let before = view.spent();
-    let (started, mut prepare) = Cost::of(|| guarded(start));
+    // Levels that are not begun need no preparation either.
+    let (started, mut prepare) = Cost::of(|| budget.used_up().map_or_else(|| guarded(start), Err));
     // Substrates are shared between methods, so building them here is not the method's own work.
     let built = view.spent();
     prepare.seconds = (prepare.seconds - (built.seconds - before.seconds)).max(0.0);
@@ -164,16 +202,16 @@ fn of_one_preparation<'s>(
     for &level in levels {
         let target = level.into();
         // A simplification that panicked is in an unknown state: it is not called again.
-        if let Some(fault) = &broken {
-            let outcome = Err(fault.clone());
-            runs.push(LevelRun { level: target, outcome, times: clock.times() });
+        if let Some(fault) = broken.clone().or_else(|| budget.used_up()) {
+            runs.push(LevelRun { level: target, outcome: Err(fault), times: clock.times() });
             continue;
         }
         on_level(level);
         let (outcome, lap) = Cost::of(|| guarded(|| simplification.at(level)));
+        budget.has_level.set(true);
         clock.add(lap);
         // After the clock has stopped: checking is the harness's work.
-        let outcome = outcome.and_then(checked);
+        let outcome = outcome.and_then(|simplified| checked(level, simplified));
         if matches!(&outcome, Err(fault) if fault.status == Status::Panicked) {
             let reason = format!("not run: the method panicked at {level}");
             broken = Some(Fault { status: Status::Panicked, reason });
@@ -229,13 +267,18 @@ fn without(all: Usage, part: Usage) -> Usage {
 }
 
 /// A valid, non-empty result, or the fault.
-fn checked(simplified: Simplified) -> Result<Simplified, Fault> {
+fn checked(level: Level, simplified: Simplified) -> Result<Simplified, Fault> {
     simplified.mesh.check().map_err(SimplifyError::from)?;
     if simplified.mesh.spheres.is_empty() {
         let why = simplified.diagnostics.warnings.join("; ");
         let why = if why.is_empty() { why } else { format!(" ({why})") };
         let reason = format!("the result has no sphere{why}; ask for a finer level");
-        return Err(Fault { status: Status::Failed, reason });
+        // A shape need not have anything at a native level, but some spheres at every count.
+        let status = match level {
+            Level::Spheres(_) => Status::Failed,
+            Level::Native(_) | Level::Published => Status::Unsupported,
+        };
+        return Err(Fault { status, reason });
     }
     Ok(simplified)
 }
@@ -283,6 +326,8 @@ pub struct Bounds<'a> {
     pub prepare: &'a Prepare<'a>,
     /// Measures results.
     pub measure: &'a Measure<'a>,
+    /// Ends the searches: bounds that are not begun have no result.
+    pub budget: &'a Budget,
     /// Gets each bound before the search for it.
     pub searching: &'a dyn Fn(Target),
     /// Gets each level before it is tried.
@@ -326,10 +371,11 @@ impl Bounds<'_> {
         // The loosest bound first: the levels tried for it help the others.
         for &bound in bounds {
             (self.searching)(Target::MaxError(bound));
-            let found = match &broken {
-                Some(fault) => Err(fault.clone()),
+            let found = match broken.clone().or_else(|| self.budget.used_up()) {
+                Some(fault) => Err(fault),
                 None => guarded(|| search.within(bound)),
             };
+            self.budget.has_level.set(true);
             // A method that panicked is in no state to be asked again.
             broken = found.as_ref().err().filter(|fault| fault.status == Status::Panicked).cloned();
             match found {
@@ -353,7 +399,8 @@ impl Bounds<'_> {
     fn timed(&self, level: Level, bound: f64) -> LevelRun {
         let view = self.shape.view();
         // Prepared again: the seconds must not profit from earlier probes.
-        let runs = answer(&view, self.info, || (self.prepare)(&view), &[level], |_| {});
+        let budget = Budget::from_now(None);
+        let runs = answer(&view, self.info, || (self.prepare)(&view), &[level], &budget, |_| {});
         let run = runs.into_iter().next().expect("one level, one run");
         LevelRun { level: Target::MaxError(bound), ..run }
     }

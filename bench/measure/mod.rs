@@ -241,6 +241,8 @@ pub fn failure_record(
             samples: scene.measure.samples,
             seconds_limit: item.limits.seconds,
             bytes_limit: item.limits.bytes,
+            budget: item.limits.budget,
+            jobs: 1,
             fingerprint: item.method.fingerprint.clone(),
         }),
         result_hash: None,
@@ -275,8 +277,8 @@ pub fn record(
     let mut record = failure_record(item, run.level, &fault, provenance);
     record.mesh_hash = Some(scene.input.hash.clone());
     record.initial = scene.ready().initial;
-    // To read a file says nothing of the time that its program took.
-    if !is_given {
+    // To read a file says nothing of the time that its program took, and a level that was not begun took none.
+    if !is_given && record.status != Status::Skipped {
         record.repetitions = vec![repetition(&run.times)];
         fill_costs(&mut record.simplify, &run.times);
     }

@@ -1,19 +1,21 @@
 //! The report of a store, made of the store's files: records, study, and the header of the earlier report.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use jiff::tz::TimeZone;
 use medial_reports::{
-    Header, MethodNote, Record, RunNote, read_header, read_records, write_report,
+    Header, MethodNote, Record, RunNote, Running, read_header, read_records, write_report,
 };
+use serde_json::json;
 
 use crate::exit::{Exit, Failure};
 use crate::files;
 use crate::provenance::Provenance;
 use crate::store::{PAGE, RESULTS};
 use crate::study::Study;
+use crate::study::item::Item;
 use crate::study::registry::Registry;
 
 mod pictures;
@@ -47,49 +49,89 @@ pub fn rebuild(dir: &Path, registry: &Registry) -> Result<Rebuilt, Failure> {
         return Err(Failure { code: Exit::NothingMeasured, message });
     }
     let header = header(dir, &records, registry, &warnings);
-    write(dir, records, warnings, &header)
+    // A study whose meshes or plug-ins are not at hand leaves the records in their order.
+    let items = Study::read(&dir.join(STUDY))
+        .and_then(|study| study.items(registry, &Provenance::here()))
+        .unwrap_or_default();
+    write(dir, (records, warnings), &items, &header, true)
 }
 
-/// After a run of `compare`: notes the run where it has `added` records, and rebuilds the report where
-/// that is needed. Without anything new the page stays as it is.
-///
-/// # Errors
-/// When the records cannot be read, or the report cannot be written.
-pub fn refresh(
-    dir: &Path,
-    registry: &Registry,
-    provenance: &Provenance,
-    added: usize,
-) -> Result<Rebuilt, Failure> {
-    let (records, warnings) = records(dir)?;
-    // Byte for byte the same page: a repeated command changes no file.
-    if added == 0 && dir.join(PAGE).exists() {
-        return Ok(Rebuilt { records, files: vec![], warnings, undrawn: vec![] });
-    }
-    let mut header = header(dir, &records, registry, &warnings);
-    for run in &mut header.runs {
-        if run.command == provenance.command && run.binary_hash == provenance.binary_hash {
+/// The report of a run of `compare`, during the run and after it.
+pub struct RunReport<'a> {
+    /// The folder.
+    pub dir: &'a Path,
+    /// The methods.
+    pub registry: &'a Registry,
+    /// The origin of the new records.
+    pub provenance: &'a Provenance,
+    /// The items of the run, in the order of the tables.
+    pub items: &'a [Item],
+    /// Whether it adds records.
+    pub adds: bool,
+}
+
+impl RunReport<'_> {
+    /// Writes the report, marked where the run goes on, with new pictures where `draws`. Without anything new the page
+    /// stays as it is.
+    ///
+    /// # Errors
+    /// When the records cannot be read, or the report cannot be written.
+    pub fn write(&self, running: Option<Running>, draws: bool) -> Result<Rebuilt, Failure> {
+        let (records, warnings) = records(self.dir)?;
+        let is_marked = read_header(self.dir).is_ok_and(|header| header.running.is_some());
+        // Byte for byte the same page: a repeated command changes no file.
+        if !self.adds && self.dir.join(PAGE).exists() && !is_marked {
+            return Ok(Rebuilt { records, files: vec![], warnings, undrawn: vec![] });
+        }
+        let mut header = header(self.dir, &records, self.registry, &warnings);
+        header.running = running;
+        let Provenance { command, binary_hash, .. } = self.provenance;
+        let mut runs = header.runs.iter_mut();
+        if let Some(run) = runs.find(|r| (&r.command, &r.binary_hash) == (command, binary_hash)) {
             // The store keeps the date of the first run of a command.
             let now = jiff::Timestamp::now().to_zoned(TimeZone::UTC);
             run.date.get_or_insert_with(|| now.date().to_string());
-            break;
         }
+        write(self.dir, (records, warnings), self.items, &header, draws)
     }
-    write(dir, records, warnings, &header)
 }
 
 fn write(
     dir: &Path,
-    records: Vec<Record>,
-    warnings: Vec<String>,
+    (mut records, warnings): (Vec<Record>, Vec<String>),
+    items: &[Item],
     header: &Header,
+    draws: bool,
 ) -> Result<Rebuilt, Failure> {
-    // An input of the last study that cannot be read any more leaves its pictures as they are.
-    let study = Study::read(&dir.join(STUDY)).ok();
-    let sources = study.and_then(|study| study.sources().ok()).unwrap_or_default();
-    let undrawn = pictures::draw(dir, &records, &sources);
+    // Tables follow the order of the records: that of the study, not that of the runs.
+    let order = places(items);
+    records.sort_by_key(|record| order.get(&row_of(record)).copied().unwrap_or(usize::MAX));
+    let mut undrawn = Vec::new();
+    if draws {
+        // An input of the last study that cannot be read any more leaves its pictures as they are.
+        let study = Study::read(&dir.join(STUDY)).ok();
+        let sources = study.and_then(|study| study.sources().ok()).unwrap_or_default();
+        undrawn = pictures::draw(dir, &records, &sources);
+    }
     let files = write_report(dir, &records, header).map_err(Failure::input)?;
     Ok(Rebuilt { records, files, warnings, undrawn })
+}
+
+/// What tells the place of a record in its study: mesh, method with parameters, level.
+fn row_of(record: &Record) -> String {
+    let Record { mesh, simplify, .. } = record;
+    json!([mesh, simplify.method, simplify.variant, simplify.params, simplify.level]).to_string()
+}
+
+/// The place of each row of a study.
+fn places(items: &[Item]) -> HashMap<String, usize> {
+    let rows = items.iter().flat_map(|item| {
+        let method = &item.method;
+        item.levels.iter().map(move |level| {
+            json!([item.scene.mesh, method.id, method.name, method.params, level]).to_string()
+        })
+    });
+    rows.enumerate().map(|(place, row)| (row, place)).collect()
 }
 
 /// Writes the requested study next to its results.

@@ -26,7 +26,7 @@ pub struct Item {
     pub scene: SceneSpec,
     /// The method.
     pub method: MethodSpec,
-    /// Levels, from fine to coarse.
+    /// Levels, in the order in which they run.
     pub levels: Vec<Target>,
     /// Seed of the method's random choices.
     pub seed: u64,
@@ -126,6 +126,10 @@ pub struct Limits {
     pub seconds: f64,
     /// Bytes of memory of the worker and the programs that it started, together.
     pub bytes: u64,
+    /// Seconds after which no further level of the item is begun. Not written where there is none, so that a worker
+    /// of an older build reads the item.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub budget: Option<f64>,
 }
 
 impl Item {
@@ -238,7 +242,7 @@ mod tests {
             seed: 0,
             repeat: 1,
             threads: 2,
-            limits: Limits { seconds: 300.0, bytes: 1 << 30 },
+            limits: Limits { seconds: 300.0, bytes: 1 << 30, budget: None },
             version: "34cd".into(),
             binary: "56ef".into(),
         }

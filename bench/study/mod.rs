@@ -32,6 +32,10 @@ use crate::study::source::{Input, InputError, Source, did_you_mean};
 
 /// Items are ended after so many seconds unless told otherwise.
 const TIMEOUT: f64 = 300.0;
+/// No further level of a method is begun on a mesh after so many seconds, likewise.
+const BUDGET: f64 = 60.0;
+/// More jobs than this are rejected as implausible.
+const MOST_JOBS: usize = 1024;
 
 /// More repetitions than this are taken for a slip.
 const MOST_REPEATS: usize = 10_000;
@@ -92,6 +96,10 @@ pub struct Study {
     pub threads: Option<usize>,
     /// Limit of time for each item, in seconds.
     pub timeout: f64,
+    /// Seconds after which a method begins no further level on a mesh.
+    pub budget: f64,
+    /// Number of items that run at the same time.
+    pub jobs: usize,
     /// Limit of memory in megabytes; three quarters of the machine's unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub memory: Option<u64>,
@@ -150,7 +158,7 @@ impl Default for Study {
             folder: None,
             meshes: vec![],
             dataset: vec![],
-            spheres: vec![1000, 500, 200, 100],
+            spheres: vec![500, 200, 100],
             max_error: vec![],
             noise: vec![],
             counts_only: false,
@@ -163,6 +171,8 @@ impl Default for Study {
             certify: None,
             threads: None,
             timeout: TIMEOUT,
+            budget: BUDGET,
+            jobs: 1,
             memory: None,
             plugins: vec![],
             after_filters: vec![],
@@ -225,6 +235,10 @@ impl Study {
             format!("--threads {threads}: a number from 1 to {MOST_THREADS}")
         } else if let Some(path) = paths.find(|path| path.to_str().is_none()) {
             format!("{}: the name is not UTF-8; rename it", path.display())
+        } else if !(self.budget > 0.0 && self.budget.is_finite()) {
+            format!("--budget {}: a positive number of seconds", self.budget)
+        } else if !(1..=MOST_JOBS).contains(&self.jobs) {
+            format!("--jobs {}: run 1 to {MOST_JOBS} items at the same time", self.jobs)
         } else if let Some(width) = self.certify.filter(|width| !(1e-6..1.0).contains(width)) {
             format!("--certify {width}: a fraction of the diagonal from 1e-6 on")
         } else if self.memory == Some(0) {
@@ -333,7 +347,7 @@ impl Study {
         Ok(found)
     }
 
-    /// The inputs of the study: those named and those of the set; [`Source::built_ins`] where there
+    /// The inputs of the study: those named and those of the set; [`Source::examples`] where there
     /// are none.
     ///
     /// # Errors
@@ -344,7 +358,7 @@ impl Study {
             sources.push(Source::parse(&self.resolved(mesh))?);
         }
         if sources.is_empty() && self.dataset.is_empty() {
-            sources = Source::built_ins();
+            sources = Source::examples();
         }
         for word in &self.dataset {
             match word.as_str() {
@@ -434,17 +448,19 @@ impl Study {
 
     /// The limits of each item.
     pub fn limits(&self, here: &Provenance) -> Limits {
-        // A quarter is left for the supervisor, the system and the judge.
+        // A quarter is left for the supervisor and the system.
         let machine = match here.machine.memory {
             0 => u64::MAX,
-            memory => memory / 4 * 3,
+            memory => memory / 4 * 3 / self.jobs.max(1) as u64,
         };
         let bytes = self.memory.map_or(machine, |megabytes| megabytes.saturating_mul(1_000_000));
-        Limits { seconds: self.timeout, bytes }
+        // One that ends after the limit of time ends nothing.
+        let budget = Some(self.budget).filter(|&budget| budget < self.timeout);
+        Limits { seconds: self.timeout, bytes, budget }
     }
 
-    /// The published level, the counts, the method's own levels and the error bounds, each from
-    /// fine to coarse.
+    /// The published level, the counts and the method's own levels, each from fine to coarse, or all in reverse where
+    /// the method does not continue from finer levels; then the error bounds.
     fn levels(&self, method: &StudyMethod, entry: &Entry) -> Vec<Target> {
         let info = entry.method().info();
         // One result at every level: more rows would repeat it.
@@ -470,6 +486,10 @@ impl Study {
             native.reverse();
         }
         levels.extend(native.into_iter().map(Target::Native));
+        // Fine levels take longest: where the order is free, they cost no coarser one its result.
+        if !info.incremental {
+            levels.reverse();
+        }
         // Last and from loose to tight, since a search that does not end must cost nothing else.
         let mut bounds = self.max_error.clone();
         bounds.sort_by(|a, b| b.total_cmp(a));

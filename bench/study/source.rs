@@ -39,6 +39,8 @@ pub enum Source {
 
 /// What an argument begins with that names a built-in shape.
 const BUILT_IN: &str = "builtin:";
+/// A part with edges, a loop, a smooth body with limbs.
+const EXAMPLES: [&str; 3] = ["bracket", "torus", "blob"];
 /// What an argument begins with that names a mesh of the library.
 const DATASET: &str = "dataset:";
 
@@ -104,8 +106,13 @@ impl Source {
         }
     }
 
-    /// The built-in shapes that a comparison takes where none is named, at their default resolutions, in the
-    /// order of the catalogue.
+    /// The built-in shapes that a comparison takes where none is named: few, so that it ends soon, on which methods
+    /// differ.
+    pub fn examples() -> Vec<Self> {
+        EXAMPLES.map(|id| Self::BuiltIn { id: id.into(), resolution: None }).into()
+    }
+
+    /// The set `builtin`: built-in shapes at their default resolutions, in the order of the catalogue.
     pub fn built_ins() -> Vec<Self> {
         let shapes = medial_datasets::catalogue();
         shapes

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -33,7 +34,7 @@ class Report:
     summary: str
     """What the command printed."""
     complete: bool
-    """Whether every result is as it was asked: none failed, is unsupported or off the count."""
+    """Whether nothing failed. Results may still be off the count, unsupported or skipped."""
 
     @property
     def page(self) -> Path:
@@ -62,7 +63,7 @@ def compare(
 
     The same as `medial compare`, in processes of its own: each item has limits of time (`timeout`, seconds) and memory
     (`memory`, MB), and results accumulate in the folder. `meshes` are paths, names (`builtin:torus`) or `Mesh`es; without
-    any, the built-in shapes. `methods` are ids or classes that `simplifier` registered; without any, all but those on
+    any, three built-in shapes. `methods` are ids or classes that `simplifier` registered; without any, all but those on
     request. `params` sets parameters by method. `arguments` are further words of the command, such as
     `["--repeat", "3"]`.
     """
@@ -90,7 +91,10 @@ def compare(
     code, printed, errors = _run(words, quiet)
     if code in (0, 3):
         return Report(folder, printed, complete=code == 0)
-    why = errors.strip().splitlines()[-1].removeprefix("medial: ") if errors.strip() else f"exit code {code}"
+    # All reasons that the command printed, without its lines of progress.
+    lines = [line.removeprefix("medial: ") for line in errors.splitlines() if line.strip()]
+    reasons = [line for line in lines if not re.match(r"\[\d+/\d+\] ", line)]
+    why = "\n".join(reasons) or f"exit code {code}"
     raise {1: InputError, 2: ParameterError}.get(code, FailedError)(why)
 
 

@@ -10,7 +10,7 @@ use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, Params, RunContext, Simplified};
 use medial::surface::{self, Loaded, Normalisation, SurfaceReport, TriMesh};
 use medial_bench::cmd::reconstruct::fitting_surface;
-use medial_bench::measure::answer::{Times, answer};
+use medial_bench::measure::answer::{Budget, Times, answer};
 use medial_bench::measure::search::{Found, Probe, Search};
 use medial_reports::Target;
 use numpy::{PyArray1, PyReadonlyArray2};
@@ -312,6 +312,7 @@ impl Run {
             method.info(),
             || method.prepare(&view, &self.params, context),
             &[level],
+            &Budget::from_now(None),
             |_| {},
         );
         let run = runs.pop().expect("one level was asked");

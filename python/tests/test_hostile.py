@@ -77,6 +77,14 @@ def test_files(tmp_path: Path) -> None:
         MedialAxis.read(tmp_path / "x.ma")
 
 
+def test_comparison_without_a_result(tmp_path: Path) -> None:
+    (tmp_path / "open.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    for quiet in (True, False):
+        with pytest.raises(MedialError, match="open.*refused") as raised:
+            medial_axis.compare(tmp_path / "open.off", methods="qmat", spheres=5, out=tmp_path / "out", quiet=quiet)
+        assert "[1/" not in str(raised.value)
+
+
 def test_medial_meshes(blob: Mesh, axis: MedialAxis) -> None:
     point = [[0.0, 0.0, 0.0]]
     with pytest.raises(InputError, match="2 radii"):

@@ -90,10 +90,10 @@ struct Group<'p, 'a> {
 /// some seconds were not compared.
 pub(super) fn timings(pairs: &[Pair<'_>], options: &DiffOptions) -> (Vec<Timing>, Vec<String>) {
     let mut untimed = Vec::new(); // reasons, in the order of the checks
-    let timed: Vec<&Pair<'_>> = pairs.iter().filter(|pair| same_machine(pair)).collect();
+    let timed: Vec<&Pair<'_>> = pairs.iter().filter(|pair| alike(pair)).collect();
     if timed.len() < pairs.len() {
         untimed.push(format!(
-            "{} of {} pairs ran on different machines: their seconds do not compare",
+            "{} of {} pairs ran on different machines or next to other items: their seconds do not compare",
             pairs.len() - timed.len(),
             pairs.len()
         ));
@@ -117,10 +117,13 @@ pub(super) fn timings(pairs: &[Pair<'_>], options: &DiffOptions) -> (Vec<Timing>
     (rows.filter(|row| row.mesh.is_none() || row.meaning.is_some()).collect(), untimed)
 }
 
-fn same_machine(pair: &Pair<'_>) -> bool {
+/// Whether both sides ran on one machine, each alone.
+fn alike(pair: &Pair<'_>) -> bool {
     let (old, new) = (&pair.old.machine, &pair.new.machine);
     // Memory as the kernel reports it differs from boot to boot.
     (&old.cpu, old.cores, &old.os) == (&new.cpu, new.cores, &new.os)
+        && pair.old.ran_alone()
+        && pair.new.ran_alone()
 }
 
 fn repetitions(pair: &Pair<'_>) -> usize {

@@ -203,7 +203,9 @@ impl Point {
             method: printable(&row_name(record)),
             level: record.simplify.level.to_string(), // stable across versions
             status: record.status,
-            seconds: seconds.filter(|_| record.status.has_result()).and_then(|s| rounded(s, 4)),
+            seconds: seconds
+                .filter(|_| record.status.has_result() && record.ran_alone())
+                .and_then(|s| rounded(s, 4)),
             bytes: record.simplify.peak_bytes,
             hausdorff: evaluation.and_then(|e| rounded(e.distances.hausdorff, 6)),
             mean: evaluation.and_then(|e| rounded(e.distances.mean, 6)),

@@ -64,6 +64,11 @@ pub(crate) fn flatten(record: &Record) -> Vec<(String, Value)> {
             descend(if is_part { key } else { format!("item/{key}") }, value, &mut values);
         }
     }
+    if !record.ran_alone() {
+        let timed = ["simplify/seconds", "simplify/cpu_seconds", "simplify/substrates"];
+        values.retain(|(path, _)| !timed.iter().any(|part| path.starts_with(part)));
+        values.retain(|(path, _)| path != "item/repetitions");
+    }
     values
 }
 

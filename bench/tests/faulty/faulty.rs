@@ -161,7 +161,7 @@ fn warms_up(shape: &Shape, level: Level, is_first: bool) -> Outcome {
 
 fn main() -> ExitCode {
     let method = |id: &'static str, prepare, at| {
-        Registered::from(Faulty { info: MethodInfo::new(id, id), prepare, at })
+        Registered::from(Faulty { info: MethodInfo::new(id, id).incremental(), prepare, at })
     };
     let late = |id, at| method(id, || Ok(()), at);
     let early = |id, prepare| method(id, prepare, largest);

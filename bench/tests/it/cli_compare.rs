@@ -33,6 +33,21 @@ fn compare_leaves_a_row_for_every_run() {
         assert!(Path::new(&out).join(file).exists(), "{file}");
     }
     done(&["report", &out]);
+    let words = [&words(line)[..], &["--out", &out, "-q", "--strict"]].concat();
+    refused(&words, 3, "");
+}
+
+#[test]
+fn without_a_mesh_few_shapes_run() {
+    let at = folder();
+    let out = at("report");
+    let words = words("compare --methods pmat --spheres 50 --counts-only --samples 200 -q --out");
+    assert_eq!(json(&[&words[..], &[&out]].concat()).1["run"], 3);
+    let meshes = ["bracket", "torus", "blob"];
+    assert!(records(&out).iter().zip(meshes).all(|(record, mesh)| record["mesh"] == mesh));
+    let all = [&words[..], &[&out, "--dataset", "builtin"]].concat();
+    let (_, object) = json(&all);
+    assert!(object["found"] == 3 && object["records"].as_u64() > Some(10), "{object}");
 }
 
 #[test]
@@ -92,7 +107,15 @@ fn a_refused_mesh_and_an_unsupported_level_are_rows() {
     let (code, object) = json(&[&compare[..], &words(options)].concat());
     let counts = ["refused", "unsupported", "ok"].map(|status| &object["status"][status]);
     assert_eq!((code, counts), (3, [&2.into(), &1.into(), &1.into()]));
-    refused(&["compare", &bad, "--counts-only", "--out", &out], 5, "");
+    // The reason is printed where nothing else is, also of an earlier run.
+    let alone =
+        ["compare", &bad, "--methods", "qmat,angle", "--spheres", "20", "-q", "--out", &out];
+    for _ in 0..2 {
+        let (code, _, stderr) = crate::command::run(&alone);
+        let lines: Vec<&str> = stderr.lines().collect();
+        let is_reason = |line: &&str, method| line.starts_with(method) && line.contains("face");
+        assert!(code == 5 && lines.len() == 3 && is_reason(&lines[1], "bad, qmat, 20"), "{stderr}");
+    }
 }
 
 /// Cubes of 8 vertices, each at `x0 .. x0 + side`.
@@ -159,11 +182,12 @@ fn nothing_is_no_success() {
     let (axis, empty, far) = (at("x.ma"), at("empty.ma"), at("far.off"));
     for (method, level) in [("lambda", "1"), ("angle", "180")] {
         let words = ["simplify", "builtin:sphere:8", "-m", method, "--level", level, "-o", &axis];
-        refused(&words, 1, "no sphere");
+        refused(&words, 3, "no sphere");
         assert!(!Path::new(&axis).exists());
     }
     fs::write(&empty, "0 0 0\n").expect("written");
-    refused(&["simplify", "builtin:box", "-m", "angle", "--initial", &empty], 1, "empty.ma");
+    let words = ["simplify", "builtin:box", "-m", "angle", "--initial", &empty, "-o", &axis];
+    refused(&words, 1, "empty.ma");
 
     // Two cubes that are far smaller than a billionth of the distance between them.
     fs::write(&far, cubes_off(&[(0.0, 1.0), (1e12, 1.0)])).expect("written");
@@ -189,7 +213,9 @@ fn given_files_are_rows_without_times_beside_the_methods() {
     let (code, object) = json(&words);
     assert_eq!(code, 0, "{object}");
     assert_eq!((&object["status"]["ok"], &object["status"]["external"]), (&1.into(), &2.into()));
-    let records = records(&out);
+    let mut records = records(&out);
+    // Given files are read first, in the order of the command line.
+    records.rotate_left(2);
     let simplified = &records[0];
     assert_eq!(simplified["simplify"]["level"]["spheres"], 20, "the count of the files");
     for (record, (name, other)) in

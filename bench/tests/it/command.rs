@@ -90,12 +90,13 @@ pub fn records(out: impl AsRef<Path>) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).expect("a whole record")).collect()
 }
 
-/// Records without what differs from run to run: seconds, memory, the command.
+/// Records without what differs from run to run: seconds, memory, the command, and how many jobs disturbed them.
 pub fn without_timings(mut records: Vec<Value>) -> Vec<Value> {
     for record in &mut records {
         for key in ["evaluate_seconds", "repetitions", "command"] {
             record.as_object_mut().expect("an object").remove(key);
         }
+        record["conditions"].as_object_mut().expect("an object").remove("jobs");
         let simplify = record["simplify"].as_object_mut().expect("an object");
         for key in ["seconds", "cpu_seconds", "peak_bytes", "substrates", "own_seconds"] {
             simplify.remove(key);

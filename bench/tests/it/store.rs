@@ -221,7 +221,8 @@ fn a_study_is_a_file_and_lies_beside_its_results() {
     let page = fs::read_to_string(out.join("index.html")).expect("a page");
     assert!(page.contains("no scale") && page.contains("builtin:box:8"));
     let native = |r: &Value| r["simplify"]["level"]["native"].as_f64();
-    assert_eq!(records(&out).iter().filter_map(native).collect::<Vec<_>>(), [30.0, 60.0]);
+    // The coarse level first: it must not wait for a fine one that may take long.
+    assert_eq!(records(&out).iter().filter_map(native).collect::<Vec<_>>(), [60.0, 30.0]);
 
     // The copy asks the same again; what the command line names wins.
     let copy = out.join("study.toml");
@@ -271,12 +272,65 @@ fn an_interrupted_run_says_how_to_go_on() {
     let (code, _, stderr) = ended(output);
     assert!(code == 130 && stderr.contains("the same command goes on"), "{code}: {stderr}");
     assert_eq!(records(&out).len(), 2);
-    // The page of the earlier run would contradict the records; a new one names both runs.
-    assert!(!out.join("index.html").exists());
+    // The page of the earlier run would contradict the records: it is one of the run that goes on.
+    let running = || {
+        let header: Value = fs::read(out.join("header.json"))
+            .map(|text| serde_json::from_slice(&text))
+            .expect("read")
+            .expect("JSON");
+        header["running"].clone()
+    };
+    assert_eq!(running(), serde_json::json!({ "done": 1, "total": 2, "missing": ["waits"] }));
+    let page = fs::read_to_string(out.join("index.html")).expect("a page");
+    assert!(page.contains("--methods qmat,waits"), "it has the first item");
     assert_eq!(run_program(faulty(), &["report", text(&out)]).0, 0);
     let page = fs::read_to_string(out.join("index.html")).expect("a page");
     assert!(page.contains("--methods pmat") && page.contains("--methods qmat,waits"));
+    assert_eq!(running(), Value::Null);
     assert!(!workers.iter().any(|&pid| is_worker(pid)), "a worker is left");
+}
+
+#[test]
+fn a_used_budget_skips_further_levels() {
+    let at = folder();
+    let out = PathBuf::from(at("out"));
+    let words =
+        ["builtin:box:8", "--methods", "pmat,qmat", "--spheres", "30,20", "--max-error", "0.2"];
+    let skipped = |budget: &str, more: &[&str]| {
+        let (code, object) = compare(&[&words[..], &["--budget", budget], more].concat(), &out);
+        assert_eq!(code, 0, "{object}");
+        (run_and_found(&object).0, object["status"]["skipped"].as_u64().expect("a count"))
+    };
+    // The first level of each method always runs.
+    assert_eq!(skipped("1e-9", &[]), (6, 4));
+    let all = records(&out);
+    let reasons = all.iter().filter(|record| record["status"] == "skipped").map(|r| &r["reason"]);
+    assert!(reasons.into_iter().all(|reason| reason.to_string().contains("--budget")));
+    assert_eq!(skipped("1e-9", &[]), (0, 4));
+    assert_eq!(skipped("1e-9", &["--retry-failed"]), (4, 2));
+    assert_eq!(skipped("300", &[]), (2, 0));
+    refused(&["compare", "builtin:box:8", "--budget", "0"], 2, "--budget 0");
+}
+
+#[test]
+fn progress_is_a_line_for_each_mesh_and_method() {
+    let at = folder();
+    let words = [
+        "compare",
+        "builtin:box:8",
+        "--methods",
+        "pmat,qmat",
+        "--spheres",
+        "30,20",
+        "--samples",
+        "100",
+    ];
+    let more = ["--repeat", "2", "--counts-only", "--out", &at("out")];
+    let (_, _, stderr) = run(&[&words[..], &more].concat());
+    let lines: Vec<&str> = stderr.lines().collect();
+    assert!(lines.len() == 2 && lines[0] == "[1/4] box-8: qmat", "{stderr}");
+    assert!(lines[1].starts_with("[2/4] box-8: pmat, about"), "{stderr}");
+    assert_eq!(run(&[&words[..], &more].concat()).2, "", "nothing is said of found results");
 }
 
 #[test]
@@ -391,11 +445,12 @@ fn pipes_devices_and_odd_names_are_refused_at_once() {
 }
 
 #[test]
-fn shards_merge_into_what_one_run_gives() {
+fn shards_and_jobs_give_what_one_run_gives() {
     let path = folder();
     let at = |name: &str| PathBuf::from(path(name));
     let words =
-        ["builtin:box:8", "builtin:torus:16", "--methods", "qmat,pmat,angle", "--spheres", "30,20"];
+        "builtin:box:8 builtin:torus:16 --methods hem,pmat,angle --spheres 30,20 --memory 4000";
+    let words: Vec<&str> = words.split_whitespace().collect();
     let (_, whole) = compare(&words, &at("whole"));
     let total = whole["run"].as_u64().expect("a count");
     let mut made = 0;
@@ -418,13 +473,17 @@ fn shards_merge_into_what_one_run_gives() {
     let object = merge("all");
     assert_eq!((&object["records"], &object["warnings"]), (&total.into(), &Value::Array(vec![])));
     assert_eq!(without_timings(records(at("all"))), without_timings(records(at("whole"))));
+    // Several items at the same time: the same results in the same order.
+    compare(&[&words[..], &["--jobs", "3"]].concat(), &at("jobs"));
+    assert!(records(at("jobs")).iter().all(|record| record["conditions"]["jobs"] == 3));
+    assert_eq!(without_timings(records(at("jobs"))), without_timings(records(at("whole"))));
     // The tables are the same but for seconds.
     let table = |out: &str| -> Vec<Vec<String>> {
         let mut rows = csv::Reader::from_path(at(out).join("results.csv")).expect("a table");
         let heads = rows.headers().expect("a head").clone();
         let kept: Vec<usize> = (0..heads.len())
             .filter(|&k| {
-                let timed = ["seconds", "substrate_", "bytes", "command", "repetition"];
+                let timed = ["seconds", "substrate_", "bytes", "command", "repetition", "jobs"];
                 !timed.iter().any(|word| heads[k].contains(word))
             })
             .collect();
@@ -433,7 +492,7 @@ fn shards_merge_into_what_one_run_gives() {
             .map(|row| kept.iter().map(|&k| row[k].to_owned()).collect())
             .collect()
     };
-    assert_eq!(table("all"), table("whole"));
+    assert_eq!([table("all"), table("jobs")], [table("whole"), table("whole")]);
     for record in records(at("all")) {
         let artifact = record["artifact"].as_str().expect("a medial mesh");
         assert!(at("all").join(artifact).exists());

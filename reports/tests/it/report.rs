@@ -62,6 +62,36 @@ fn the_same_records_give_the_same_bytes() {
 }
 
 #[test]
+fn seconds_that_other_items_disturbed_are_in_no_table() {
+    let alone = comparison(&SHAPES[..2], &METHODS, &COUNTS);
+    let mut disturbed = alone.clone();
+    for record in &mut disturbed {
+        let conditions = record.conditions.get_or_insert_default();
+        conditions.jobs = 2;
+    }
+    let seconds = |records: &[Record]| -> Vec<String> {
+        let files = report_of(records);
+        let mut reader = csv::Reader::from_reader(&files["results.csv"][..]);
+        let names = reader.headers().unwrap().clone();
+        let place = names.iter().position(|name| name == "seconds_total").unwrap();
+        reader.records().map(|row| row.unwrap()[place].to_owned()).collect()
+    };
+    assert!(seconds(&alone).iter().all(|cell| !cell.is_empty()));
+    assert!(seconds(&disturbed).iter().all(String::is_empty));
+    let times = |records: &[Record]| -> Vec<String> {
+        let files = report_of(records);
+        let mut rows =
+            text(&files, "tables/summary.md").lines().filter(|row| row.starts_with("| "));
+        let heads = rows.find(|row| row.contains("time (s)")).unwrap();
+        let place = heads.split('|').position(|head| head.contains("time (s)")).unwrap();
+        let cells = rows.skip(1).map(|row| row.split('|').nth(place).unwrap());
+        cells.take(METHODS.len()).map(|cell| cell.trim().to_owned()).collect()
+    };
+    assert!(times(&alone).iter().all(|cell| cell != "–"), "{:?}", times(&alone));
+    assert!(times(&disturbed).iter().all(|cell| cell == "–"), "{:?}", times(&disturbed));
+}
+
+#[test]
 fn every_record_is_a_row_of_the_csv_with_its_numbers() {
     let records = comparison(&SHAPES[..6], &METHODS, &COUNTS);
     let files = report_of(&records);
