@@ -44,7 +44,7 @@ const WORDS = [
   ["Betti", "Betti numbers over Z2 of the medial mesh: components, independent loops, enclosed bubbles. A medial axis has " +
     "those of its solid: components, total genus, cavities."],
   ["status", "ok; other count: a result with another number of spheres; unsupported: the method does not do this, which is " +
-    "no failure; refused: the input was not accepted; failed, panicked, timed out, out of memory: the run ended so; " +
+    "no failure; skipped: the method had used its budget of time on this mesh; refused: the input was not accepted; failed, panicked, timed out, out of memory: the run ended so; " +
     "invalid output: the output is no medial mesh."],
 ];
 const UNITS = "Lengths in % of the bounding-box diagonal of the input; seconds of wall clock, shared substrates included. " +
