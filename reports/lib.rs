@@ -52,7 +52,7 @@ pub use record::{
 };
 pub use text::{file_stem, printable, significant};
 pub use view3d::View3d;
-pub use write::{ReportError, read_header, write_report};
+pub use write::{ReportError, read_header, results_csv, write_report};
 
 #[cfg(doctest)]
 #[doc = include_str!("README.md")]

@@ -156,6 +156,14 @@ fn view(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option<Me
     Some(MeshView { name: strip.view.clone(), file, text: left.map(|_| text.to_owned()) })
 }
 
+/// The content of `results.csv` for some records.
+///
+/// # Errors
+/// [`ReportError::Content`] when the CSV cannot be made.
+pub fn results_csv(records: &[Record]) -> Result<Vec<u8>, ReportError> {
+    to_csv(&Comparison::new(records)).map_err(|error| ReportError::content("results.csv", error))
+}
+
 /// Reads the header that [`write_report`] left in a folder, to rebuild its report.
 ///
 /// # Errors

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::{Args, FromArgMatches, ValueEnum};
 use medial::Vec3;
 use medial::complex::{ContourError, MedialMesh, union_surface};
 use medial::metrics::JudgeOptions;
@@ -110,8 +110,58 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let line = StageLine::new(global.stages());
     line.at("reading");
     let read = Read::new(arguments)?;
+    let Drawn { png, object, text } = drawn(arguments, show, &read, &|stage| line.at(stage))?;
+    files::write(&arguments.output, &png)?;
+    drop(line);
+    Ok(print_result(global, &object, &text, &read.warnings))
+}
+
+/// A picture of a shape and of medial meshes in its normalised units, as PNG, with the figures that the verb prints as
+/// JSON. `words` are options of the verb; names are captions.
+///
+/// # Errors
+/// When an option is not understood, or a reconstruction cannot be made.
+pub fn draw(
+    words: Vec<String>,
+    shape: Shape,
+    axes: Vec<(String, MedialMesh)>,
+    at: &dyn Fn(&'static str),
+) -> Result<(Vec<u8>, serde_json::Value), Failure> {
+    let command = Arguments::augment_args(clap::Command::new("render").no_binary_name(true));
+    // Neither is read or written: the parser requires both.
+    let fixed = ["mesh.off", "--output", "picture.png"].map(str::to_owned);
+    let parsed = command.try_get_matches_from(fixed.into_iter().chain(words));
+    let mut arguments = parsed
+        .and_then(|found| Arguments::from_arg_matches(&found))
+        .map_err(|error| Failure::usage(first_line(&error.to_string())))?;
+    let (names, axes): (Vec<_>, Vec<_>) = axes.into_iter().unzip();
+    arguments.axes = names.into_iter().map(PathBuf::from).collect();
+    let show = show(&arguments)?;
+    let drawn = drawn(&arguments, show, &Read { shape, axes, warnings: vec![] }, at)?;
+    Ok((drawn.png, drawn.object))
+}
+
+/// The sentence of a message of the parser, without the usage after it.
+fn first_line(text: &str) -> String {
+    text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned()
+}
+
+/// A picture and the figures about it.
+struct Drawn {
+    png: Vec<u8>,
+    object: serde_json::Value,
+    text: String,
+}
+
+/// Draws the inputs.
+fn drawn(
+    arguments: &Arguments,
+    show: Show,
+    read: &Read,
+    at: &dyn Fn(&'static str),
+) -> Result<Drawn, Failure> {
     let camera = camera(arguments, read.shape.mesh());
-    line.at("making the reconstructions");
+    at("making the reconstructions");
     let mut deviations = vec![];
     if matches!(show, Show::Error | Show::Reconstruction) {
         // What `evaluate` measures by default: the drawn vertices are fewer and give another number.
@@ -125,17 +175,15 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
             deviations.push(made);
         }
     }
-    line.at("drawing");
+    at("drawing");
     let (picture, drawing) = Cost::of(|| match read.axes.len() {
         // A single picture has room for a bar of colours, a strip has one scale for all.
-        0 | 1 => single(arguments, show, &read, camera, deviations.first()),
-        _ => side_by_side(arguments, &read, camera, &deviations),
+        0 | 1 => single(arguments, show, read, camera, deviations.first()),
+        _ => side_by_side(arguments, read, camera, &deviations),
     });
     let picture = picture.map_err(usage)?;
-    let bytes = picture.to_png().map_err(Failure::input)?;
+    let png = picture.to_png().map_err(Failure::input)?;
     let output = &arguments.output;
-    files::write(output, &bytes)?;
-    drop(line);
     let (width, height) = (picture.width(), picture.height());
     let errors = deviations
         .iter()
@@ -149,7 +197,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     for words in deviations.iter().filter_map(Deviation::hausdorff) {
         text = text + "; " + &words;
     }
-    Ok(print_result(global, &object, &text, &read.warnings))
+    Ok(Drawn { png, object, text })
 }
 
 /// What is drawn, as far as there are medial meshes for it.

@@ -345,8 +345,8 @@ pub fn fill_result(simplify: &mut Simplify, result: &Simplified) {
     });
 }
 
-/// `ok`, or the fault of a result with another count than the requested one.
-fn count_fault(level: Target, result: &Simplified) -> Fault {
+/// `ok`, or the fault of a result whose count is more than 2 % off the requested one.
+pub fn count_fault(level: Target, result: &Simplified) -> Fault {
     let reached = result.mesh.spheres.len();
     match level {
         Target::Spheres(asked)

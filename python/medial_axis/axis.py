@@ -6,12 +6,13 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from . import _medial
 from ._arguments import FloatArray, IndexArray, Progress, call, floats, indices, path_text, real, truths, whole
+from ._methods import typed
 from .errors import InputError, ParameterError
 from .evaluation import Evaluation
 from .mesh import Mesh
@@ -137,12 +138,13 @@ class MedialAxis:
         kept = truths(keep, "keep", len(self))
         return MedialAxis._of(self._axis.induced(kept.tolist()), self.mesh)
 
+    @typed
     def simplify(
         self,
         method: str | type[Any],
         *,
         spheres: int | None = None,
-        level: float | None = None,
+        level: float | Literal["published"] | None = None,
         max_error: float | None = None,
         seed: int = 0,
         threads: int | None = None,
@@ -174,8 +176,17 @@ class MedialAxis:
         from .method import id_of
 
         told: dict[str, Any] = json.loads(facts)
-        told["warnings"] = tuple(told["warnings"])
-        run = Run(method=id_of(method), params=given, **told)
+        record = told["simplify"]
+        run = Run(
+            method=id_of(method),
+            asked=told["asked"],
+            params=given,
+            native_level=record["native_level"],
+            seconds=record["seconds"],
+            substrates=record["substrates"],
+            warnings=tuple(record["warnings"]),
+            max_error=told["max_error"],
+        )
         return MedialAxis._of(axis, self.mesh, run=run)
 
     def evaluate(

@@ -3,16 +3,20 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use medial::complex::{self, Look, MedialMesh, MedialUnion, SphereValues};
+use medial::Vec3;
+use medial::complex::{
+    self, Contacts, DualTriangulation, Look, MedialMesh, MedialUnion, SphereValues,
+};
 use medial::geometry::Sphere;
 use medial::metrics::JudgeOptions;
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, Params, RunContext, Simplified};
 use medial::surface::{self, Loaded, Normalisation, SurfaceReport, TriMesh};
 use medial_bench::cmd::reconstruct::fitting_surface;
-use medial_bench::measure::answer::{Budget, Times, answer};
+use medial_bench::measure::answer::{Budget, answer};
 use medial_bench::measure::search::{Found, Probe, Search};
-use medial_reports::Target;
+use medial_bench::measure::{count_fault, fill_costs, fill_result};
+use medial_reports::{Simplify, Target};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use serde_json::{Map, Value, json};
@@ -76,6 +80,9 @@ pub fn in_input_units(mesh: &MedialMesh, units: &Normalisation) -> MedialMesh {
     mesh.transformed(units.diagonal, |point| units.backward(point))
 }
 
+/// Contact samples and their indices, words of the shape's options, whether it is the initial medial mesh.
+type State<'py> = (Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>, Option<(String, String)>, bool);
+
 /// The level of a call: at most one of the three is given.
 fn level(
     spheres: Option<usize>,
@@ -132,6 +139,54 @@ impl Axis {
         let shape = surface.model.shape(&shape_options(sampling, dual, seed)?)?;
         let mesh = Arc::clone(&self.mesh);
         Ok(Self { mesh, ..Self::new(MedialMesh::default(), Some(shape)) })
+    }
+
+    /// What arrays and surface do not say, for a copy: the samples that spheres touch (s x 3, and n x 4 indices), the
+    /// sampling and the dual of the shape, and whether it is the initial medial mesh.
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<State<'py>> {
+        let contacts = match &self.mesh.contacts {
+            None => None,
+            Some(contacts) => Some((
+                of_points(py, contacts.samples.iter().copied())?.into_any(),
+                of_rows(py, contacts.of_sphere.iter().copied())?.into_any(),
+            )),
+        };
+        let options = self.shape.as_ref().map(Shape::options);
+        let options = options.map(|options| {
+            let dual = match options.dual {
+                DualTriangulation::Fan => "fan",
+                DualTriangulation::Delaunay => "delaunay",
+            };
+            (options.sampling.to_string(), dual.to_owned())
+        });
+        Ok((contacts, options, self.is_initial))
+    }
+
+    /// The same mesh with the [`state`](Self::state) of another one.
+    fn with_state(
+        &self,
+        samples: Option<PyReadonlyArray2<'_, f64>>,
+        of_sphere: Option<PyReadonlyArray2<'_, u32>>,
+        surface: Option<&Surface>,
+        options: Option<(String, String)>,
+        is_initial: bool,
+    ) -> PyResult<Self> {
+        let mut mesh = MedialMesh::clone(&self.mesh);
+        if let (Some(samples), Some(of_sphere)) = (samples, of_sphere) {
+            let samples: Arc<[Vec3]> = points(&samples)?.rows().into();
+            let of_sphere: Vec<[u32; 4]> =
+                of_sphere.as_array().rows().into_iter().map(|r| [r[0], r[1], r[2], r[3]]).collect();
+            mesh.contacts = Some(Contacts { samples, of_sphere });
+            mesh.check().map_err(Failure::from)?;
+        }
+        let shape = match (surface, options) {
+            (Some(surface), Some((sampling, dual))) => {
+                // The word has the seed, unless that is 0.
+                Some(surface.model.shape(&shape_options(&sampling, &dual, 0)?)?)
+            }
+            _ => None,
+        };
+        Ok(Self { is_initial, ..Self::new(mesh, shape) })
     }
 
     #[getter]
@@ -317,7 +372,17 @@ impl Run {
         );
         let run = runs.pop().expect("one level was asked");
         let simplified = run.outcome.map_err(Failure::of_fault)?;
-        let facts = facts(&simplified, &run.times, level, search);
+        let fault = count_fault(target, &simplified);
+        let mut record = Simplify {
+            params: self.params.clone(),
+            seed: context.seed,
+            threads: Some(rayon::current_num_threads()),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            ..Simplify::asked(method.info().id.clone(), target, fault.status)
+        };
+        fill_costs(&mut record, &run.times);
+        fill_result(&mut record, &simplified);
+        let facts = json!({ "asked": level.to_string(), "simplify": record, "max_error": search });
         Ok((simplified, facts))
     }
 
@@ -344,22 +409,4 @@ impl Run {
         };
         Ok((level, json!({ "bound": bound, "hausdorff": error, "tried": tried })))
     }
-}
-
-fn facts(simplified: &Simplified, times: &Times, level: Level, search: Option<Value>) -> Value {
-    let substrates = times.substrates.iter();
-    let substrates: Map<String, Value> = substrates
-        .map(|(substrate, cost)| (substrate.name().to_owned(), cost.seconds.into()))
-        .collect();
-    let seconds = times.seconds();
-    json!({
-        "asked": level.to_string(),
-        "native_level": simplified.native_level,
-        "seconds": {
-            "substrate": seconds.substrate, "prepare": seconds.prepare, "simplify": seconds.simplify,
-        },
-        "substrates": substrates,
-        "warnings": simplified.diagnostics.warnings,
-        "max_error": search,
-    })
 }

@@ -7,11 +7,13 @@
 //! | `surface` | a closed surface with its substrates, each built once |
 //! | `axis` | a medial mesh, in the units of its surface |
 //! | `method` | a Python class as a `MedialSimplifier` |
+//! | `picture` | pictures, rows of `results.csv` |
 //! | `calls` | long calls, numpy arrays, exceptions |
 
 mod axis;
 mod calls;
 mod method;
+mod picture;
 mod surface;
 
 use std::ffi::OsString;
@@ -38,6 +40,8 @@ fn _medial(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<method::RunHandle>()?;
     module.add_function(wrap_pyfunction!(triangulate, module)?)?;
     module.add_function(wrap_pyfunction!(method::methods, module)?)?;
+    module.add_function(wrap_pyfunction!(picture::render, module)?)?;
+    module.add_function(wrap_pyfunction!(picture::results_row, module)?)?;
     module.add_function(wrap_pyfunction!(run_command, module)?)?;
     Ok(())
 }

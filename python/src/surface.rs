@@ -7,7 +7,8 @@ use medial::complex::MedialMesh;
 use medial::metrics::{Judge, JudgeOptions};
 use medial::shape::{Shape, ShapeOptions};
 use medial::surface::{
-    self, InsideTest, Loaded, Sampling, SignedDistance, SurfaceReport, TriMesh, TriangleBvh,
+    self, Components, Format, InsideTest, Loaded, MendOptions, Normalisation, Sampling,
+    SignedDistance, SurfaceReport, TriMesh, TriangleBvh,
 };
 use medial_bench::study::external::{AxisOptions, read_axis};
 use medial_bench::study::item::Dual;
@@ -151,6 +152,77 @@ impl Surface {
     #[getter]
     fn faces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.faces.get(py, || of_rows(py, self.model.mesh.faces.iter().copied()))
+    }
+
+    /// Bounding-box diagonal; zero without an extent.
+    #[getter]
+    fn diagonal(&self) -> f64 {
+        Normalisation::of(&self.model.mesh).map_or(0.0, |units| units.diagonal)
+    }
+
+    /// The exactly known medial axis of a built-in shape: with name, arrays and report all that a copy is made of.
+    #[getter]
+    fn truth(&self) -> Option<Axis> {
+        self.model.truth.clone().map(|mesh| Axis::new(mesh, None))
+    }
+
+    /// A surface from the parts of another one, unchanged. Checked again, unless it is known to bound no solid.
+    #[staticmethod]
+    #[allow(clippy::too_many_arguments)]
+    fn from_parts(
+        py: Python<'_>,
+        vertices: PyReadonlyArray2<'_, f64>,
+        faces: PyReadonlyArray2<'_, u32>,
+        name: String,
+        report: &str,
+        truth: Option<PyRef<'_, Axis>>,
+        is_solid: bool,
+        call: Call,
+    ) -> PyResult<Self> {
+        let mesh = TriMesh {
+            vertices: points(&vertices)?.rows().to_vec(),
+            faces: triangles(&faces)?.rows().to_vec(),
+        };
+        let report: SurfaceReport = serde_json::from_str(report)
+            .map_err(|error| Failure::input(format!("report of {name}: {error}")))?;
+        let truth = truth.map(|axis| MedialMesh::clone(&axis.mesh));
+        let named = mesh.faces.iter().flatten().max();
+        if named.is_some_and(|&vertex| vertex as usize >= mesh.vertices.len()) {
+            return Err(Failure::input(format!("{name}: a face names a missing vertex")).into());
+        }
+        long(py, &call, move |_, monitor| {
+            monitor.at("checking");
+            if is_solid {
+                surface::validate(&mesh)?;
+            }
+            Ok(Self::new(name, Loaded { mesh, report }, truth))
+        })
+    }
+
+    /// A surface that bounds a solid, from a file or from the text of an OFF file, after repairs on demand.
+    #[staticmethod]
+    #[allow(clippy::too_many_arguments)]
+    fn repair(
+        py: Python<'_>,
+        path: PathBuf,
+        off: Option<Vec<u8>>,
+        fill_holes: bool,
+        separate: bool,
+        largest: bool,
+        name: Option<String>,
+        call: Call,
+    ) -> PyResult<Self> {
+        let components = if largest { Components::Largest } else { Components::All };
+        let options = MendOptions { fill_holes, separate, components };
+        long(py, &call, move |_, monitor| {
+            monitor.at("repairing");
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let loaded = match off {
+                Some(text) => surface::mend_bytes(&text, Format::Off, options)?,
+                None => surface::mend(&path, options)?,
+            };
+            Ok(Self::new(name.unwrap_or(stem), loaded, None))
+        })
     }
 
     /// The report of reading it, as JSON.
