@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
+ROOT = EXAMPLES.parent.parent
 
 
 def run(name: str, *words: object, cwd: Path) -> str:
@@ -27,6 +29,17 @@ def needs(module: str) -> None:
 def test_three_lines(tmp_path: Path) -> None:
     printed = run("three_lines.py", cwd=tmp_path)
     assert printed.startswith("100 spheres") and "certified" in printed
+
+
+@pytest.mark.parametrize("text", [ROOT / "docs" / "python.md", ROOT / "python" / "README.md"], ids=str)
+def test_the_first_program_of_a_text(text: Path, tmp_path: Path) -> None:
+    if not text.is_file():
+        pytest.skip("not part of the source distribution")
+    shell, program = re.findall(r"^```(?:sh|python)\n(.*?)^```$", text.read_text(), re.MULTILINE | re.DOTALL)[:2]
+    # No index has the package.
+    assert shell.startswith("pip install ./python ")
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0 and "certified" in done.stdout, done.stderr
 
 
 def test_a_class_of_ones_own_and_plots_of_its_results(tmp_path: Path) -> None:
