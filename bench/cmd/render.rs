@@ -135,9 +135,9 @@ pub fn draw(
         .and_then(|found| Arguments::from_arg_matches(&found))
         .map_err(|error| Failure::usage(first_line(&error.to_string())))?;
     let (names, axes): (Vec<_>, Vec<_>) = axes.into_iter().unzip();
-    arguments.axes = names.into_iter().map(PathBuf::from).collect();
+    arguments.axes = names.iter().map(PathBuf::from).collect();
     let show = show(&arguments)?;
-    let drawn = drawn(&arguments, show, &Read { shape, axes, warnings: vec![] }, at)?;
+    let drawn = drawn(&arguments, show, &Read { shape, names, axes, warnings: vec![] }, at)?;
     Ok((drawn.png, drawn.object))
 }
 
@@ -220,6 +220,8 @@ fn show(arguments: &Arguments) -> Result<Show, Failure> {
 /// The inputs, in diagonals of the surface.
 struct Read {
     shape: Shape,
+    /// Captions of the medial meshes.
+    names: Vec<String>,
     axes: Vec<MedialMesh>,
     warnings: Vec<String>,
 }
@@ -235,7 +237,9 @@ impl Read {
             warnings.extend(notes);
             axes.push(mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p)));
         }
-        Ok(Self { shape, axes, warnings })
+        let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into();
+        let names = arguments.axes.iter().map(stem).collect();
+        Ok(Self { shape, names, axes, warnings })
     }
 }
 
@@ -248,8 +252,8 @@ fn side_by_side(
 ) -> Result<Picture, RenderError> {
     let mut panels = Vec::new();
     for (k, axis) in read.axes.iter().enumerate() {
-        let name = arguments.axes[k].file_stem().unwrap_or_default().to_string_lossy();
-        let caption = format!("{name}, {}", counted(axis.spheres.len() as u64, "sphere"));
+        let count = counted(axis.spheres.len() as u64, "sphere");
+        let caption = format!("{}, {count}", read.names[k]);
         // Panels differ by file name and count alone.
         panels.push(Panel { axis, caption, errors: deviations.get(k).map(Deviation::errors) });
     }

@@ -23,6 +23,7 @@ from .errors import (
     InputError,
     InternalError,
     MedialError,
+    MedialWarning,
     ParameterError,
     UnsupportedError,
 )
@@ -39,6 +40,7 @@ from .method import (
     methods,
     simplifier,
 )
+from .picture import Picture, render
 from .points import Triangulation, betti, closest_points, signed_distance, triangulate
 
 __all__ = [
@@ -52,11 +54,13 @@ __all__ = [
     "Level",
     "MedialAxis",
     "MedialError",
+    "MedialWarning",
     "Mesh",
     "MethodInfo",
     "NativeLevel",
     "Param",
     "ParameterError",
+    "Picture",
     "Report",
     "Run",
     "RunContext",
@@ -72,6 +76,7 @@ __all__ = [
     "compare",
     "load",
     "methods",
+    "render",
     "signed_distance",
     "simplifier",
     "triangulate",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import operator
 import os
 from collections.abc import Callable
@@ -55,6 +56,15 @@ def path_text(path: Any, what: str = "path") -> str:
     if "\0" in text:
         raise ParameterError(f"{what}: {text!r} has a zero byte")
     return text
+
+
+def need(module: str, package: str) -> Any:
+    """A module of an optional package."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        message = f"{package} is needed for this: pip install {package.lower()} ({error})"
+        raise ImportError(message, name=module) from error
 
 
 FloatArray = npt.NDArray[np.float64]

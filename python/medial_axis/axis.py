@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 import os
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from . import _medial
-from ._arguments import FloatArray, IndexArray, Progress, call, floats, indices, path_text, real, truths, whole
+from ._arguments import FloatArray, IndexArray, Progress, call, floats, indices, need, path_text, real, truths, whole
 from ._methods import typed
-from .errors import InputError, ParameterError
+from .errors import InputError, MedialWarning, ParameterError
 from .evaluation import Evaluation
 from .mesh import Mesh
+
+if TYPE_CHECKING:
+    from .picture import Backend
+
+_OPTIONS = ("spheres", "level", "max_error", "seed", "threads", "progress", "params")
 
 
 @dataclass(frozen=True)
@@ -25,26 +32,45 @@ class Run:
     method: str
     asked: str
     """The level, in words."""
-    params: Mapping[str, Any]
+    params: Mapping[str, Any] = field(hash=False)
     native_level: float | None = None
     """The method's own level that met the request, where it has one."""
-    seconds: Mapping[str, float] = field(default_factory=dict)
-    """By stage: `substrate`, shared by all methods; `prepare` and `simplify`, the method's own."""
-    substrates: Mapping[str, float] = field(default_factory=dict)
+    seconds: Mapping[str, float] = field(default_factory=dict, hash=False)
+    """By stage: `substrate`, shared by all methods; `prepare` and `simplify`, the method's own; and their `total`."""
+    substrates: Mapping[str, float] = field(default_factory=dict, hash=False)
     """Seconds of each substrate that the method used, whoever built it first."""
     warnings: tuple[str, ...] = ()
-    max_error: Mapping[str, Any] | None = None
+    max_error: Mapping[str, Any] | None = field(default=None, hash=False)
     """What the search for an error bound found."""
+    record: Mapping[str, Any] = field(default_factory=dict, repr=False, hash=False)
+    """All of it, as `simplify` in a line of `results.jsonl`."""
 
 
 class MedialAxis:
     """A medial mesh: spheres, and edges and triangles between them, in the units of its surface.
 
-    Made by `Mesh.medial_axis`, `Mesh.read_axis`, `MedialAxis.read`, or of arrays: n x 3 centres, n radii, and indices from 0.
-    Sides of faces are added as edges, and simplices sorted.
+    Made by `Mesh.medial_axis`, `Mesh.read_axis`, `MedialAxis.read`, or of arrays. Sides of faces are added as edges, and
+    simplices sorted. Two medial meshes are equal if their arrays are, bit by bit, whatever their surfaces and runs. A
+    medial mesh does not change; it can be pickled, copied, and be a key.
+
+    Args:
+        centres: n x 3 positions.
+        radii: n radii.
+        edges: m x 2 indices of spheres, from 0.
+        faces: k x 3 indices of spheres.
+        mesh: The surface that it is of, in the same unit.
+
+    Raises:
+        InputError: The arrays are wrong.
+
+    Example:
+        >>> from medial_axis import MedialAxis
+        >>> MedialAxis([[0, 0, 0], [1, 0, 0]], [1.0, 0.5], edges=[[0, 1]])
+        <MedialAxis: 2 spheres, 1 edges, 0 faces>
     """
 
     _axis: _medial.Axis
+    _png: bytes | None
     mesh: Mesh | None
     """The surface that it is of, where that is known."""
     run: Run | None
@@ -67,13 +93,28 @@ class MedialAxis:
             indices(edges, "edges", 2),
             indices(faces, "faces", 3),
         )
-        self._axis, self.mesh, self.run, self.remarks = axis, None, None, ()
+        self._axis, self.mesh, self.run, self.remarks, self._png = axis, None, None, (), None
         if mesh is not None:
             self._axis, self.mesh = self.of(mesh)._axis, mesh
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> MedialAxis:
-        """Reads `.ma` in any dialect, `.ply` or `.obj`; no surface is known then."""
+        """Reads a file; `Mesh.read_axis` does so with a surface.
+
+        Args:
+            path: A `.ma` file in any dialect, `.ply` or `.obj`.
+
+        Returns:
+            The medial mesh, without a surface; `.remarks` lists repairs.
+
+        Raises:
+            InputError: The file cannot be read.
+
+        Example:
+            >>> MedialAxis([[0, 0, 0]], [1.0]).save("point.ma")
+            >>> MedialAxis.read("point.ma")
+            <MedialAxis: 1 spheres, 0 edges, 0 faces>
+        """
         axis, remarks = _medial.Axis.read(path_text(path))
         return cls._of(axis, None, remarks=remarks)
 
@@ -84,21 +125,39 @@ class MedialAxis:
         mesh: Mesh | None,
         *,
         run: Run | None = None,
-        remarks: list[str] | None = None,
+        remarks: Iterable[str] = (),
     ) -> MedialAxis:
         made = cls.__new__(cls)
-        made._axis, made.mesh, made.run, made.remarks = axis, mesh, run, tuple(remarks or ())
+        made._axis, made.mesh, made.run, made.remarks, made._png = axis, mesh, run, tuple(remarks), None
         return made
 
     def of(
         self, mesh: Mesh, *, sampling: str = "vertices", dual: str = "fan", seed: int = 0
     ) -> MedialAxis:
-        """The same medial mesh as one of this surface, which must have the same units."""
+        """The same medial mesh as one of a surface, which must have the same unit.
+
+        Args:
+            mesh: The surface.
+            sampling: Samples of the surface for methods, as in `Mesh.medial_axis`.
+            dual: As in `Mesh.medial_axis`.
+            seed: Seed of random samples.
+
+        Returns:
+            A medial mesh that can be simplified and evaluated.
+
+        Raises:
+            InputError: `mesh` is no surface that bounds a solid.
+            ParameterError: `sampling` or `dual` is another word.
+
+        Example:
+            >>> MedialAxis([[0, 0, 0]], [0.3]).of(Mesh.read("builtin:box"))
+            <MedialAxis of box: 1 spheres, 0 edges, 0 faces>
+        """
         if not isinstance(mesh, Mesh):
             raise InputError(f"mesh: a Mesh is needed, not a {type(mesh).__name__}")
         mesh._solid()
         made = self._axis.of(mesh._surface, str(sampling), str(dual), call(seed)[0])
-        return MedialAxis._of(made, mesh, run=self.run, remarks=list(self.remarks))
+        return MedialAxis._of(made, mesh, run=self.run, remarks=self.remarks)
 
     @property
     def centres(self) -> FloatArray:
@@ -134,7 +193,22 @@ class MedialAxis:
         return len(self.radii)
 
     def induced(self, keep: Any) -> MedialAxis:
-        """The spheres for which `keep` is true, with the edges and faces between them."""
+        """Some of the spheres, with the edges and faces between them.
+
+        Args:
+            keep: n truth values.
+
+        Returns:
+            A medial mesh of the same surface.
+
+        Raises:
+            InputError: `keep` has another shape or type.
+
+        Example:
+            >>> axis = Mesh.read("builtin:box").medial_axis()
+            >>> len(axis.induced(axis.radii > axis.radii.mean())) < len(axis)
+            True
+        """
         kept = truths(keep, "keep", len(self))
         return MedialAxis._of(self._axis.induced(kept.tolist()), self.mesh)
 
@@ -152,40 +226,83 @@ class MedialAxis:
         params: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> MedialAxis:
-        """The simplification of this medial mesh by a method, an id (`medial_axis.methods()`) or a class.
+        """The simplification by a method. One of `spheres`, `level` and `max_error` is needed.
 
-        Give one of `spheres`, how many; `level`, the method's own, in its unit; `max_error`, as few spheres as keep the
-        Hausdorff error within this fraction of the diagonal; or none, for the published level. Parameters are those of the
-        paper, by name (`k=1e-5`), or in `params`. `.run` of the result says the rest.
+        Args:
+            method: An id of `medial_axis.methods()`, or a class of your own.
+            spheres: Number of spheres.
+            level: The method's own level, in its unit; or `published`, the setting of its paper.
+            max_error: As few spheres as keep the Hausdorff error within this fraction of the bounding-box diagonal.
+            seed: Seed of every random choice.
+            threads: Threads of a pool of its own; by default all calls share one.
+            progress: Called with a stage and its completed share.
+            params: Parameters of the method, by name.
+            more: The same as keywords: `k=1e-5`. `medial_axis.methods()` lists them with units and defaults.
+
+        Returns:
+            A medial mesh of the same surface. Its `.run` has the seconds by stage, the level and warnings, which are
+            also given as `MedialWarning`s: a missed number of spheres among them.
+
+        Raises:
+            ParameterError: The method, its level or a parameter is wrong or missing.
+            UnsupportedError: The method does not do this.
+            FailedError: The method failed.
+            InputError: This medial mesh has no surface.
+
+        Example:
+            >>> axis = Mesh.read("builtin:box").medial_axis()
+            >>> axis.simplify("qmat", spheres=20, k=1e-5)
+            <MedialAxis of box by qmat: 20 spheres, 42 edges, 24 faces>
         """
+        from .method import id_of, known_params
+
         if not isinstance(method, (str, type)):
             raise ParameterError(f"method: an id or a class is needed, not {method!r}")
         given = {**(params or {}), **more}
+        id, known = id_of(method), known_params(method)
+        unknown = [] if known is None else [str(key) for key in given if key not in known]
+        for key in unknown:
+            for near in difflib.get_close_matches(key, [*_OPTIONS, *(known or ())], 1):
+                raise ParameterError(f"{id}: unknown parameter `{key}`; did you mean `{near}`?")
+        # Other mistakes are reported by the method itself.
+        if known is not None and not unknown and spheres is level is max_error is None:
+            raise ParameterError(
+                f"{id}: no level is given; give one of spheres=N, level=X (the method's own, or "
+                '"published") and max_error=E (a fraction of the diagonal)'
+            )
         try:
             text = json.dumps(given, allow_nan=False, default=_plain)
         except (TypeError, ValueError) as error:
             raise ParameterError(f"parameters {given!r}: {error}") from None
+        is_published = isinstance(level, str) and level == "published"
+        if is_published and not spheres is max_error is None:
+            raise ParameterError("give one of spheres, level and max_error")
         axis, facts = self._axis.simplify(
             method,
             None if spheres is None else whole(spheres, "spheres", 0, 2**32 - 1),
-            None if level is None else real(level, "level"),
+            None if level is None or is_published else real(level, "level"),
             None if max_error is None else real(max_error, "max_error"),
             text,
             call(seed, threads, progress),
         )
-        from .method import id_of
-
         told: dict[str, Any] = json.loads(facts)
         record = told["simplify"]
+        notes = tuple(record["warnings"])
+        missed = f"{len(axis.radii)} spheres instead of {spheres}"
+        if record["status"] == "other_count" and not any(missed in note for note in notes):
+            notes = (missed, *notes)
+        for note in notes:
+            warnings.warn(f"{id}: {note}", MedialWarning, stacklevel=2)
         run = Run(
-            method=id_of(method),
+            method=id,
             asked=told["asked"],
             params=given,
             native_level=record["native_level"],
             seconds=record["seconds"],
             substrates=record["substrates"],
-            warnings=tuple(record["warnings"]),
+            warnings=notes,
             max_error=told["max_error"],
+            record=record,
         )
         return MedialAxis._of(axis, self.mesh, run=run)
 
@@ -199,9 +316,27 @@ class MedialAxis:
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> Evaluation:
-        """Every metric against a surface, its own unless another is given.
+        """Every metric against a surface.
 
-        `certify` encloses the Hausdorff error in an interval at most so wide, a fraction of the diagonal.
+        Args:
+            mesh: The surface; by default its own.
+            certify: Enclose the Hausdorff error in an interval of this width, a fraction of the bounding-box diagonal.
+            samples: Surface samples next to the vertices; as many on the union.
+            seed: Seed of the samples.
+            threads: Threads of a pool of its own; by default all calls share one.
+            progress: Called with a stage and its completed share.
+
+        Returns:
+            The metrics; errors are fractions of the bounding-box diagonal. `.row()` is a row for a frame.
+
+        Raises:
+            InputError: There is no surface, or no sphere.
+            ParameterError: A number is out of its range.
+
+        Example:
+            >>> axis = Mesh.read("builtin:box").medial_axis().simplify("qmat", spheres=20)
+            >>> round(axis.evaluate().hausdorff, 3)
+            ()
         """
         mesh = mesh if mesh is not None else self.mesh
         if not isinstance(mesh, Mesh):
@@ -213,7 +348,7 @@ class MedialAxis:
             None if certify is None else real(certify, "certify"),
             call(seed, threads, progress),
         )
-        return Evaluation.from_json(text)
+        return Evaluation.from_json(text, mesh=mesh.name, simplify=self.run.record if self.run else None)
 
     def reconstruct(
         self,
@@ -222,9 +357,23 @@ class MedialAxis:
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> Mesh:
-        """The boundary of the union of spheres, cones and slabs, within a tolerance (a fraction of the diagonal).
+        """The boundary of the union of spheres, cones and slabs.
 
-        Its `problem` says why it bounds no solid, where it does not.
+        Args:
+            tolerance: Its largest distance from that boundary, a fraction of the bounding-box diagonal.
+            threads: Threads of a pool of its own; by default all calls share one.
+            progress: Called with a stage and its completed share.
+
+        Returns:
+            The surface; its `problem` is the reason where it bounds no solid.
+
+        Raises:
+            InputError: There is no sphere, or the tolerance is too small.
+
+        Example:
+            >>> axis = Mesh.read("builtin:box").medial_axis().simplify("qmat", spheres=20)
+            >>> axis.reconstruct(tolerance=0.01).problem is None
+            True
         """
         name = f"{self.mesh.name}-union" if self.mesh is not None else "union"
         tolerance = None if tolerance is None else real(tolerance, "tolerance")
@@ -238,16 +387,99 @@ class MedialAxis:
         color: str | None = None,
         balls: bool = False,
     ) -> None:
-        """Writes `.ma`, `.ply`, `.vtp` (ParaView), `.glb` (Blender, browsers), or `.obj` without radii; complete or not at all.
+        """Writes a file, completely or not at all.
 
-        For viewers: `color` is `radius` or `stability`, and `balls` adds the spheres themselves.
+        Args:
+            path: `.ma`, `.ply`, `.vtp` (ParaView), `.glb` (Blender, browsers), or `.obj` without radii.
+            color: For viewers: `radius` or `stability`.
+            balls: For viewers: add the spheres themselves.
+
+        Raises:
+            InputError: The file cannot be written.
+            ParameterError: `color` is another word.
+
+        Example:
+            >>> Mesh.read("builtin:box").medial_axis().save("box.glb", color="stability")
         """
         self._axis.save(path_text(path), color, bool(balls))
 
-    def to_pyvista(self) -> Any:
-        """As a `pyvista.PolyData`: lines for edges without a face, triangles, and the radius at points."""
-        import pyvista
+    def plot(self, *, backend: Backend | None = None, screenshot: str | os.PathLike[str] | None = None) -> Any:
+        """Shows it in its surface: in a window or a notebook by PyVista where that is installed, else as a PNG.
 
+        Args:
+            backend: `pyvista` or `png`; by default PyVista if it is installed.
+            screenshot: Writes a picture into this file instead, without a screen.
+
+        Returns:
+            The result of `pyvista.Plotter.show`; or a `Picture`, which a notebook shows.
+
+        Raises:
+            ParameterError: `backend` is another word.
+            ImportError: PyVista is requested and not installed.
+            InputError: There is no surface, for a PNG.
+
+        Example:
+            >>> Mesh.read("builtin:box").medial_axis().plot(backend="png").width
+            800
+        """
+        from .picture import plot
+
+        return plot(self, backend, screenshot)
+
+    def to_networkx(self) -> Any:
+        """The graph of spheres and edges for NetworkX.
+
+        Returns:
+            A `networkx.Graph`. Nodes are the indices of spheres with `centre` (a tuple of 3) and `radius`; `graph["faces"]`
+            is the list of triples.
+
+        Raises:
+            ImportError: NetworkX is not installed.
+
+        Example:
+            >>> axis = MedialAxis([[0, 0, 0], [1, 0, 0]], [1.0, 0.5], edges=[[0, 1]])
+            >>> axis.to_networkx().nodes[1]  # doctest: +SKIP
+            {'centre': (1.0, 0.0, 0.0), 'radius': 0.5}
+        """
+        graph = need("networkx", "NetworkX").Graph(faces=[tuple(face) for face in self.faces.tolist()])
+        spheres = zip(self.centres.tolist(), self.radii.tolist())
+        graph.add_nodes_from((i, {"centre": tuple(c), "radius": r}) for i, (c, r) in enumerate(spheres))
+        graph.add_edges_from(self.edges.tolist())
+        return graph
+
+    def to_trimesh(self) -> Any:
+        """Spheres and faces for trimesh, which has no edges without a face: `lone_edges()` are those.
+
+        Returns:
+            A `trimesh.Trimesh` with `vertex_attributes["radius"]`.
+
+        Raises:
+            ImportError: trimesh is not installed.
+
+        Example:
+            >>> axis = Mesh.read("builtin:box").medial_axis()
+            >>> len(axis.to_trimesh().faces) == len(axis.faces)  # doctest: +SKIP
+            True
+        """
+        trimesh = need("trimesh", "trimesh")
+        radii = {"radius": self.radii.copy()}
+        return trimesh.Trimesh(self.centres.copy(), self.faces.copy(), process=False, vertex_attributes=radii)
+
+    def to_pyvista(self) -> Any:
+        """Triangles, and lines for edges without a face, for PyVista.
+
+        Returns:
+            A `pyvista.PolyData` with the `radius` of each point.
+
+        Raises:
+            ImportError: PyVista is not installed.
+
+        Example:
+            >>> axis = Mesh.read("builtin:box").medial_axis()
+            >>> axis.to_pyvista()["radius"].max() == axis.radii.max()  # doctest: +SKIP
+            True
+        """
+        pyvista = need("pyvista", "PyVista")
         data = pyvista.PolyData()
         data.points = self.centres.copy()
         lone = self.lone_edges()
@@ -257,7 +489,15 @@ class MedialAxis:
         return data
 
     def lone_edges(self) -> IndexArray:
-        """The edges that are a side of no face."""
+        """The edges that are a side of no face.
+
+        Returns:
+            m x 2 indices of spheres.
+
+        Example:
+            >>> MedialAxis([[0, 0, 0], [1, 0, 0]], [1.0, 0.5], edges=[[0, 1]]).lone_edges().tolist()
+            [[0, 1]]
+        """
         if len(self.faces) == 0:
             return self.edges
         sides = np.concatenate([self.faces[:, [0, 1]], self.faces[:, [0, 2]], self.faces[:, [1, 2]]])
@@ -274,6 +514,58 @@ class MedialAxis:
         return (
             f"<MedialAxis{of}{by}: {len(self)} spheres, {len(self.edges)} edges, {len(self.faces)} faces>"
         )
+
+    def _repr_png_(self) -> bytes | None:
+        from .picture import small_png
+
+        self._png = self._png or small_png(self)
+        return self._png
+
+    def _repr_html_(self) -> str:
+        from .picture import to_html
+
+        rows: dict[str, object] = {}
+        if self.mesh is not None:
+            rows["medial mesh of"] = self.mesh.name
+        if self.run is not None:
+            rows["method"] = f"{self.run.method}, {self.run.asked}"
+        rows |= {"spheres": len(self), "edges": len(self.edges), "faces": len(self.faces), "Betti numbers": self.betti}
+        if self.mesh is not None:
+            rows["Betti numbers of the solid"] = tuple(self.mesh.report()["expected_betti"])
+        return to_html(self._repr_png_(), rows)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, MedialAxis):
+            return NotImplemented
+        return self is other or all(map(np.array_equal, self._arrays(), other._arrays()))
+
+    def __hash__(self) -> int:
+        return hash(tuple(array.tobytes() for array in self._arrays()))
+
+    def _arrays(self) -> tuple[Any, ...]:
+        return self.centres, self.radii, self.edges, self.faces
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (*self._arrays(), self._axis.state(), self.mesh, self.run, self.remarks)
+
+
+def _restored(
+    centres: FloatArray,
+    radii: FloatArray,
+    edges: IndexArray,
+    faces: IndexArray,
+    state: Any,
+    mesh: Mesh | None,
+    run: Run | None,
+    remarks: tuple[str, ...],
+) -> MedialAxis:
+    """A medial mesh from its pickle."""
+    contacts, options, is_initial = state
+    samples, of_sphere = contacts or (None, None)
+    surface = None if mesh is None else mesh._surface
+    axis = MedialAxis(centres, radii, edges, faces)._axis
+    made = axis.with_state(samples, of_sphere, surface, options, is_initial)
+    return MedialAxis._of(made, mesh, run=run, remarks=remarks)
 
 
 def _plain(value: Any) -> Any:

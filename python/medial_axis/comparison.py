@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from . import _plugins
-from ._arguments import path_text
+from ._arguments import need, path_text
 from ._command import STARTED_BY
 from .errors import FailedError, InputError, ParameterError
 from .mesh import Mesh
@@ -100,12 +100,12 @@ def compare(
 
 def load(folder: str | os.PathLike[str] = "medial-report") -> pd.DataFrame:
     """The results of a folder as a frame of pandas: a row for each result, with the columns of `results.csv`."""
-    import pandas as pd
-
+    pandas = need("pandas", "pandas")
     path = Path(path_text(folder, "folder")) / _RESULTS
     if not path.is_file():
         raise InputError(f"{path}: there are no results; `compare` or `medial compare` makes them")
-    return pd.read_csv(path, low_memory=False)
+    frame: pd.DataFrame = pandas.read_csv(path, low_memory=False)
+    return frame
 
 
 def _inputs(meshes: Any, folder: Path) -> list[str]:

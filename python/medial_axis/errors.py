@@ -29,3 +29,7 @@ class CancelledError(MedialError, RuntimeError):
 
 class InternalError(MedialError, RuntimeError):
     """A fault of this package: please report it with the input."""
+
+
+class MedialWarning(UserWarning):
+    """A result that is not as requested, or that needs attention; also in `.run.warnings` of the result."""

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
+import io
 import json
 import typing
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Annotated, Any
+
+from . import _medial
 
 _DIAGONAL = "fraction of the bounding-box diagonal"
 
@@ -47,7 +52,7 @@ class TriangleQuality:
 class Spikes:
     """Spike measures; METHODOLOGY.md defines them."""
 
-    by_ratio: tuple[dict[str, float], ...]
+    by_ratio: tuple[dict[str, float], ...] = field(hash=False)
     """For each threshold on the stability ratio: shares and counts."""
     dangling_edges: int
     fins: int
@@ -106,17 +111,41 @@ class Evaluation:
     """Those that the solid's topology implies."""
     counts: Counts
     certified: Certificate | None
-    axis: dict[str, Any] | None
+    axis: dict[str, Any] | None = field(hash=False)
     """Distances to the exactly known axis of a built-in shape."""
     diagonal: Annotated[float, "unit of the mesh"]
     """The bounding-box diagonal of the mesh."""
     seed: int
     warnings: tuple[str, ...]
+    record: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
+    """The same as in a line of `results.jsonl`: `mesh`, `simplify` and `evaluate`."""
 
     @classmethod
-    def from_json(cls, text: str) -> Evaluation:
-        """Reads what `medial evaluate --json` prints."""
+    def from_json(cls, text: str, *, mesh: str = "", simplify: Mapping[str, Any] | None = None) -> Evaluation:
+        """Reads the output of `medial evaluate --json`.
+
+        Args:
+            text: A JSON object.
+            mesh: Name of the surface, for `row`.
+            simplify: The run, for `row`: `Run.record`.
+
+        Returns:
+            The metrics.
+
+        Raises:
+            KeyError: A metric is missing.
+
+        Example:
+            >>> from medial_axis import Evaluation, Mesh
+            >>> found = Mesh.read("builtin:box").medial_axis().evaluate(samples=1000)
+            >>> Evaluation.from_json(json.dumps(found.record["evaluate"])) == found
+            True
+        """
         told: dict[str, Any] = json.loads(text)
+        status = "external" if simplify is None else simplify["status"]
+        sizes = {name: told["counts"][name] for name in ("spheres", "edges", "faces")}
+        asked = simplify or {"method": "", "level": "published", "status": status, **sizes}
+        record = {"mesh": mesh, "status": status, "simplify": asked, "evaluate": json.loads(text)}
         certified = told.get("certified")
         if certified is not None:
             witness = certified.pop("witness")
@@ -132,23 +161,74 @@ class Evaluation:
             betti=tuple(told["betti"]),
             expected_betti=None if expected is None else tuple(expected),
             warnings=tuple(told["warnings"]),
+            record=record,
         )
         # The command says its version beside the numbers.
         return cls(**{name: told[name] for name in (f.name for f in dataclasses.fields(cls))})
 
     @classmethod
     def unit(cls, name: str) -> str | None:
-        """The unit of a field; None for counts and what is no number."""
+        """The unit of a field.
+
+        Args:
+            name: The field.
+
+        Returns:
+            The unit; None for counts and what is no number.
+
+        Raises:
+            KeyError: There is no such field.
+
+        Example:
+            >>> Evaluation.unit("hausdorff")
+            'fraction of the bounding-box diagonal'
+        """
         hint = typing.get_type_hints(cls, include_extras=True)[name]
         noted: tuple[str, ...] = getattr(hint, "__metadata__", ())
         return noted[0] if noted else None
 
     def in_units(self, name: str) -> float:
-        """A length in the unit of the mesh instead of diagonals."""
+        """A length in the unit of the mesh instead of diagonals.
+
+        Args:
+            name: The field.
+
+        Returns:
+            The length.
+
+        Raises:
+            ValueError: The field is no length.
+
+        Example:
+            >>> found = Mesh.read("builtin:box").medial_axis().evaluate(samples=1000)
+            >>> found.in_units("hausdorff") == found.hausdorff * found.diagonal
+            True
+        """
         value = getattr(self, name)
         if self.unit(name) != _DIAGONAL or value is None:
             raise ValueError(f"{name} is no fraction of the diagonal, but {self.unit(name) or value!r}")
         return float(value) * self.diagonal
+
+    def row(self) -> dict[str, Any]:
+        """A row for a frame, with the columns of `results.csv`: the metrics, and the run that made the medial mesh.
+
+        Returns:
+            Values by column; columns without a value are left out.
+
+        Example:
+            >>> axis = Mesh.read("builtin:box").medial_axis()
+            >>> rows = [axis.simplify("qmat", spheres=n).evaluate(samples=1000).row() for n in (40, 20)]
+            >>> [(row["mesh"], row["method"], row["spheres"]) for row in rows]
+            [('box', 'qmat', 40), ('box', 'qmat', 20)]
+            >>> import pandas  # doctest: +SKIP
+            >>> pandas.DataFrame(rows)[["spheres", "hausdorff"]]  # doctest: +SKIP
+        """
+        [row] = csv.DictReader(io.StringIO(_medial.results_row(json.dumps(self.record))))
+        # Nothing is known of the machine, and of the request of a medial mesh from elsewhere.
+        unknown = {"cores", "memory", "seeds"}
+        if self.record["simplify"]["method"] == "":
+            unknown |= {"level", "asked", "params", "seed"}
+        return {key: _value(text) for key, text in row.items() if text != "" and key not in unknown}
 
     def __str__(self) -> str:
         def percent(share: float | None) -> str:
@@ -167,6 +247,15 @@ class Evaluation:
             lower, upper = percent(self.certified.lower), percent(self.certified.upper)
             lines.append(f"  Hausdorff, certified    {lower} to {upper}")
         return "\n".join(lines + [f"  warning: {warning}" for warning in self.warnings])
+
+
+def _value(text: str) -> Any:
+    """The number or truth value in a cell of a CSV file, else its text."""
+    try:
+        value = json.loads(text)
+    except ValueError:
+        return text
+    return value if isinstance(value, (int, float)) else text
 
 
 def _triple(point: Any) -> tuple[float, float, float]:

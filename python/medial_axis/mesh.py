@@ -6,24 +6,44 @@ import json
 import os
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
 from . import _medial
-from ._arguments import FloatArray, IndexArray, Progress, call, floats, indices, path_text, whole
+from ._arguments import FloatArray, IndexArray, Progress, call, floats, indices, need, path_text, whole
 from .errors import InputError, ParameterError
 
 if TYPE_CHECKING:
     from .axis import MedialAxis
+    from .picture import Backend
 
 
 class Mesh:
     """A surface that bounds a solid: closed, manifold, oriented outward.
 
-    `vertices` and `faces` are arrays, n x 3; or `vertices` alone is a mesh of trimesh, Open3D or PyVista, or a pair of
-    arrays. Repeated vertices are merged and faces turned as in a file; `report()` says what was done. A surface that
-    bounds no solid is refused with the reason (`InputError`).
+    Repeated vertices are merged and faces turned as in a file; `report()` lists these repairs. Two meshes are equal if their
+    vertices and faces are, bit by bit. A mesh does not change; it can be pickled, copied, and be a key.
+
+    Args:
+        vertices: n x 3 positions, in any unit; or a mesh of trimesh, Open3D or PyVista, or a pair of arrays.
+        faces: m x 3 indices of vertices, from 0.
+        name: Name in tables.
+        threads: Threads of a pool of its own; by default all calls share one.
+        progress: Called with a stage and its completed share.
+
+    Raises:
+        InputError: The arrays are wrong, or the surface bounds no solid: it is open, not manifold, or empty. `Mesh.repair`
+            closes holes.
+
+    Example:
+        >>> from medial_axis import Mesh
+        >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+        >>> Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], name="tetrahedron")
+        <Mesh tetrahedron: 4 vertices, 4 faces>
     """
 
     _surface: _medial.Surface
     _problem: str | None
+    _png: bytes | None
     source: str | None
     """The path or name that it was read from."""
 
@@ -44,8 +64,7 @@ class Mesh:
             str(name),
             call(0, threads, progress),
         )
-        self._problem = None
-        self.source = None
+        self._problem = self._png = self.source = None
 
     @classmethod
     def read(
@@ -55,16 +74,90 @@ class Mesh:
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> Mesh:
-        """Reads OFF, OBJ, PLY, STL or GLB; or `builtin:ID`, a solid with a known axis, or `dataset:NAME`."""
+        """Reads a file or a built-in shape.
+
+        Args:
+            path: An OFF, OBJ, PLY, STL or GLB file; `builtin:ID`, a solid with a known axis; or `dataset:NAME`.
+            threads: Threads of a pool of its own; by default all calls share one.
+            progress: Called with a stage and its completed share.
+
+        Returns:
+            The surface, in the unit of the file.
+
+        Raises:
+            InputError: The file cannot be read, or bounds no solid.
+
+        Example:
+            >>> Mesh.read("builtin:torus")
+            <Mesh torus: 2048 vertices, 4096 faces>
+        """
         text = path_text(path)
         mesh = cls._of(_medial.Surface.read(text, call(0, threads, progress)))
         mesh.source = text
         return mesh
 
     @classmethod
+    def repair(
+        cls,
+        vertices: Any,
+        faces: Any = None,
+        *,
+        fill_holes: bool = False,
+        separate: bool = False,
+        components: Literal["all", "largest"] = "all",
+        name: str | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> Mesh:
+        """A surface that bounds a solid, from one that need not: as `medial repair`.
+
+        Args:
+            vertices: A file; or n x 3 positions, or a mesh of another package, as for `Mesh`.
+            faces: m x 3 indices of vertices, from 0.
+            fill_holes: Close holes by triangles between their vertices.
+            separate: Move parts that touch in a vertex apart there, by a thousandth of the size of its faces.
+            components: Keep all parts, or the largest one.
+            name: Name in tables; by default the stem of the file.
+            threads: Threads of a pool of its own; by default all calls share one.
+            progress: Called with a stage and its completed share.
+
+        Returns:
+            The surface; `report()["repairs"]` lists the repairs.
+
+        Raises:
+            InputError: The surface bounds no solid even so.
+            ParameterError: `components` is another word.
+
+        Example:
+            >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+            >>> mesh = Mesh.repair(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]], fill_holes=True)
+            >>> len(mesh.faces), mesh.report()["repairs"][0]["repair"]
+            (4, 'filled_hole')
+        """
+        if components not in ("all", "largest"):
+            raise ParameterError(f"components: all or largest is needed, not {components!r}")
+        path, off = "mesh", None
+        if faces is None and isinstance(vertices, (str, os.PathLike)):
+            path = path_text(vertices)
+        else:
+            given = _foreign(vertices) if faces is None else (vertices, faces)
+            off = _off(floats(given[0], "vertices"), indices(given[1], "faces", 3))
+        largest = components == "largest"
+        made = _medial.Surface.repair(
+            path,
+            off,
+            bool(fill_holes),
+            bool(separate),
+            largest,
+            None if name is None else str(name),
+            call(0, threads, progress),
+        )
+        return cls._of(made)
+
+    @classmethod
     def _of(cls, surface: _medial.Surface, problem: str | None = None) -> Mesh:
         mesh = cls.__new__(cls)
-        mesh._surface, mesh._problem, mesh.source = surface, problem, None
+        mesh._surface, mesh._problem, mesh.source, mesh._png = surface, problem, None, None
         return mesh
 
     @property
@@ -83,17 +176,40 @@ class Mesh:
         return self._surface.faces
 
     @property
+    def diagonal(self) -> float:
+        """Length of the bounding box's diagonal, in the unit of the mesh: errors are fractions of it."""
+        return self._surface.diagonal
+
+    @property
     def problem(self) -> str | None:
         """Why a reconstruction bounds no solid; None where it does, and for every mesh that was read."""
         return self._problem
 
     def report(self) -> dict[str, Any]:
-        """Counts, topology, repairs and warnings, as `medial info --json` says them."""
+        """Counts, topology, repairs and warnings, with the keys of `medial info --json`.
+
+        Returns:
+            A new dictionary; `volume` and `area` are in the unit of the mesh.
+
+        Example:
+            >>> Mesh.read("builtin:torus").report()["expected_betti"]
+            [1, 1, 0]
+        """
         result: dict[str, Any] = json.loads(self._surface.report())
         return result
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes .ply, .off or .obj. The file is complete or not there."""
+        """Writes a file, completely or not at all.
+
+        Args:
+            path: A `.ply`, `.off` or `.obj` file.
+
+        Raises:
+            InputError: It has another extension, or cannot be written.
+
+        Example:
+            >>> Mesh.read("builtin:box").save("box.ply")
+        """
         self._surface.save(path_text(path))
 
     def medial_axis(
@@ -107,8 +223,23 @@ class Mesh:
     ) -> MedialAxis:
         """The Voronoi medial mesh, from which methods start.
 
-        `sampling` is `vertices`, `auto` (adds samples where the axis fails), `uniform:COUNT` or `blue:COUNT`; `dual`
-        is how Voronoi polygons are triangulated: `fan` or `delaunay`.
+        Args:
+            sampling: `vertices`, `auto` (adds samples where the axis fails), `uniform:COUNT` or `blue:COUNT`.
+            dual: How Voronoi polygons are triangulated: `fan` or `delaunay`.
+            seed: Seed of random samples.
+            threads: Threads of a pool of its own; by default all calls share one.
+            progress: Called with a stage and its completed share.
+
+        Returns:
+            The medial mesh, in the unit of the surface.
+
+        Raises:
+            ParameterError: `sampling` or `dual` is another word.
+            InputError: The surface bounds no solid, or no sphere is inside.
+
+        Example:
+            >>> Mesh.read("builtin:box").medial_axis()
+            <MedialAxis of box: 1215 spheres, 2846 edges, 1632 faces>
         """
         from .axis import MedialAxis
 
@@ -127,11 +258,30 @@ class Mesh:
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> MedialAxis:
-        """Reads a medial mesh of this surface: `.ma` in any dialect, `.ply`, `.obj`.
+        """Reads a medial mesh of this surface.
 
-        In the units of the surface, unless `fit` finds others (`auto`: if it does not fit as it is). `radii="surface"` gives
-        spheres without radii their distance to the surface; `lenient` takes lines that the header does not announce;
-        `block` is which of several meshes in one file is meant, from 1. `.remarks` of the result says what was done.
+        Args:
+            path: A `.ma` file in any dialect, `.ply` or `.obj`.
+            fit: `none`: the file has the unit of the surface. `similarity` finds scale and translation; `auto` does if the
+                spheres do not fit otherwise.
+            radii: `surface` gives spheres without radii their distance to the surface.
+            lenient: Take lines that the header does not announce.
+            block: Which of several meshes in one file, from 1.
+            threads: Threads of a pool of its own; by default all calls share one.
+            progress: Called with a stage and its completed share.
+
+        Returns:
+            The medial mesh; `.remarks` lists repairs and the fitting.
+
+        Raises:
+            InputError: The file cannot be read.
+            ParameterError: An option has another value.
+
+        Example:
+            >>> box = Mesh.read("builtin:box")
+            >>> box.medial_axis().save("box.ma")
+            >>> box.read_axis("box.ma") == box.medial_axis()
+            True
         """
         from .axis import MedialAxis
 
@@ -148,27 +298,119 @@ class Mesh:
     def closest_points(
         self, points: Any, *, threads: int | None = None
     ) -> tuple[FloatArray, FloatArray, IndexArray]:
-        """For each of n points the closest one of the surface (n x 3), its distance (n) and its face (n)."""
+        """The closest point of the surface for each of n points.
+
+        Args:
+            points: n x 3 positions.
+            threads: Threads of a pool of its own; by default all calls share one.
+
+        Returns:
+            Closest points (n x 3), distances (n, in the unit of the mesh) and faces (n).
+
+        Raises:
+            InputError: `points` is no n x 3 array of finite numbers.
+
+        Example:
+            >>> closest, distances, faces = Mesh.read("builtin:box").closest_points([[0, 0, 9]])
+            >>> closest[0].round(6), distances.round(6)
+            ()
+        """
         return self._surface.closest_points(floats(points, "points"), call(0, threads))
 
     def signed_distance(self, points: Any, *, threads: int | None = None) -> FloatArray:
-        """The distance of each point to the surface: negative inside, with an exact sign."""
+        """The distance of each of n points to the surface: negative inside, with an exact sign.
+
+        Args:
+            points: n x 3 positions.
+            threads: Threads of a pool of its own; by default all calls share one.
+
+        Returns:
+            n distances, in the unit of the mesh.
+
+        Raises:
+            InputError: `points` is no n x 3 array of finite numbers, or the surface bounds no solid.
+
+        Example:
+            >>> Mesh.read("builtin:box").signed_distance([[0, 0, 0], [0, 0, 9]]).round(6)
+            ()
+        """
         self._solid()
         return self._surface.signed_distance(floats(points, "points"), call(0, threads))
 
-    def to_trimesh(self) -> Any:
-        """As a `trimesh.Trimesh`, with the vertices in the same order."""
-        import trimesh
+    def plot(self, *, backend: Backend | None = None, screenshot: str | os.PathLike[str] | None = None) -> Any:
+        """Shows the surface: in a window or a notebook by PyVista where that is installed, else as a PNG.
 
+        Args:
+            backend: `pyvista` or `png`; by default PyVista if it is installed.
+            screenshot: Writes a picture into this file instead, without a screen.
+
+        Returns:
+            The result of `pyvista.Plotter.show`; or a `Picture`, which a notebook shows.
+
+        Raises:
+            ParameterError: `backend` is another word.
+            ImportError: PyVista is requested and not installed.
+
+        Example:
+            >>> Mesh.read("builtin:box").plot(backend="png").width
+            800
+        """
+        from .picture import plot
+
+        return plot(self, backend, screenshot)
+
+    def to_trimesh(self) -> Any:
+        """The surface for trimesh, with the vertices in the same order.
+
+        Returns:
+            A `trimesh.Trimesh`.
+
+        Raises:
+            ImportError: trimesh is not installed.
+
+        Example:
+            >>> Mesh.read("builtin:box").to_trimesh().is_watertight  # doctest: +SKIP
+            True
+        """
+        trimesh = need("trimesh", "trimesh")
         return trimesh.Trimesh(self.vertices.copy(), self.faces.copy(), process=False)
 
     def to_open3d(self) -> Any:
-        """As an `open3d.geometry.TriangleMesh`."""
-        import open3d
+        """The surface for Open3D, with the vertices in the same order.
 
+        Returns:
+            An `open3d.geometry.TriangleMesh`.
+
+        Raises:
+            ImportError: Open3D is not installed.
+
+        Example:
+            >>> Mesh.read("builtin:box").to_open3d().is_watertight()  # doctest: +SKIP
+            True
+        """
+        open3d = need("open3d", "Open3D")
         vertices = open3d.utility.Vector3dVector(self.vertices.copy())
         faces = open3d.utility.Vector3iVector(self.faces.astype("int32"))
         return open3d.geometry.TriangleMesh(vertices, faces)
+
+    def to_pyvista(self) -> Any:
+        """The surface for PyVista, with the vertices in the same order.
+
+        Returns:
+            A `pyvista.PolyData`.
+
+        Raises:
+            ImportError: PyVista is not installed.
+
+        Example:
+            >>> Mesh.read("builtin:box").to_pyvista().is_manifold  # doctest: +SKIP
+            True
+        """
+        pyvista = need("pyvista", "PyVista")
+        data = pyvista.PolyData()
+        data.points = self.vertices.copy()
+        data.faces = np.insert(self.faces.astype(int), 0, 3, axis=1).ravel()
+        return data
 
     def _solid(self) -> None:
         if self._problem is not None:
@@ -176,6 +418,76 @@ class Mesh:
 
     def __repr__(self) -> str:
         return f"<Mesh {self.name}: {len(self.vertices)} vertices, {len(self.faces)} faces>"
+
+    def _repr_png_(self) -> bytes | None:
+        from .picture import small_png
+
+        self._png = self._png or small_png(self)
+        return self._png
+
+    def _repr_html_(self) -> str:
+        from .picture import to_html
+
+        report = self.report()
+        rows = {
+            "mesh": self.name,
+            "vertices": len(self.vertices),
+            "faces": len(self.faces),
+            "diagonal": f"{self.diagonal:.6g}",
+            "Betti numbers of the solid": self._problem or tuple(report["expected_betti"]),
+            "repairs": len(report["repairs"]),
+        }
+        return to_html(self._repr_png_(), rows)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Mesh):
+            return NotImplemented
+        return self is other or all(map(np.array_equal, self._arrays(), other._arrays()))
+
+    def __hash__(self) -> int:
+        return hash(tuple(array.tobytes() for array in self._arrays()))
+
+    def _arrays(self) -> tuple[Any, ...]:
+        return self.vertices, self.faces
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        from .axis import MedialAxis
+
+        truth = self._surface.truth
+        known = None if truth is None else MedialAxis._of(truth, None)
+        return _restored, (*self._arrays(), self.name, self._surface.report(), known, self._problem, self.source)
+
+
+def _restored(
+    vertices: FloatArray,
+    faces: IndexArray,
+    name: str,
+    report: str,
+    truth: MedialAxis | None,
+    problem: str | None,
+    source: str | None,
+) -> Mesh:
+    """A mesh from its pickle."""
+    surface = _medial.Surface.from_parts(
+        floats(vertices, "vertices"),
+        indices(faces, "faces", 3),
+        name,
+        report,
+        None if truth is None else truth._axis,
+        problem is None,
+        call(),
+    )
+    mesh = Mesh._of(surface, problem)
+    mesh.source = source
+    return mesh
+
+
+def _off(vertices: FloatArray, faces: IndexArray) -> bytes:
+    """The text of an OFF file."""
+    lines = [f"OFF\n{len(vertices)} {len(faces)} 0"]
+    lines += [" ".join(map(repr, row)) for row in vertices.tolist()]
+    lines += [" ".join(map(str, (3, *row))) for row in faces.tolist()]
+    return "\n".join(lines).encode() + b"\n"
 
 
 def _foreign(value: Any) -> tuple[Any, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import re
 import sys
@@ -198,6 +199,20 @@ def registered() -> dict[str, type[Any]]:
 def methods() -> dict[str, dict[str, Any]]:
     """The methods of the program by their ids: titles, citations, levels, parameters with units and defaults."""
     return {info["id"]: info for info in json.loads(_medial.methods())}
+
+
+@functools.cache
+def _built_in() -> dict[str, list[str]]:
+    """Names of the parameters of the methods of the program."""
+    return {id: [param["name"] for param in info["params"]] for id, info in methods().items()}
+
+
+def known_params(method: str | type[Any]) -> list[str] | None:
+    """Names of the parameters of a method; None for what is none."""
+    if isinstance(method, str):
+        return _built_in().get(method)
+    info = getattr(method, "info", None)
+    return [param.name for param in info.params] if isinstance(info, MethodInfo) else None
 
 
 def id_of(method: str | type[Any]) -> str:

@@ -34,7 +34,7 @@ def test_in_this_process(axis: MedialAxis) -> None:
     least = float(tenth + next_one) / 2 / axis.evaluate(samples=100).diagonal
     assert len(axis.simplify(Largest, spheres=30, least=least)) == 10
     with pytest.raises(UnsupportedError, match="ask for a number"):
-        axis.simplify(Largest)
+        axis.simplify(Largest, level="published")
     with pytest.raises(ParameterError, match="unknown parameter `most`; there are: least"):
         axis.simplify(Largest, spheres=3, most=1)
     with pytest.raises(ParameterError, match="least = 'x': a number"):

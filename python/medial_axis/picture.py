@@ -1,0 +1,191 @@
+"""Pictures: PNG without a screen, by the verb `render`; windows and notebooks, by PyVista."""
+
+from __future__ import annotations
+
+import base64
+import html
+import importlib.util
+import json
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from . import _medial
+from ._arguments import Progress, call, need, path_text
+from .errors import InputError, MedialError, ParameterError
+from .mesh import Mesh
+
+if TYPE_CHECKING:
+    from .axis import MedialAxis
+
+Backend = Literal["pyvista", "png"]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture, which a notebook shows."""
+
+    png: bytes = field(repr=False)
+    """The content of a PNG file."""
+    width: int
+    """Pixels."""
+    height: int
+    """Pixels."""
+    direction: tuple[float, float, float]
+    """From the shape to the eye."""
+    up: tuple[float, float, float]
+    errors: tuple[Mapping[str, float | None], ...] = field(hash=False)
+    """For each reconstruction that is drawn: `max` and `mean` of the drawn errors, and `hausdorff` as `evaluate` has it;
+    fractions of the bounding-box diagonal."""
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the PNG file.
+
+        Args:
+            path: The file.
+
+        Raises:
+            OSError: It cannot be written.
+
+        Example:
+            >>> from medial_axis import Mesh, render
+            >>> render(Mesh.read("builtin:box")).save("box.png")
+        """
+        Path(path_text(path)).write_bytes(self.png)
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+
+def render(
+    mesh: Mesh | MedialAxis,
+    axes: MedialAxis | Iterable[MedialAxis] = (),
+    *,
+    show: Literal["surface", "axis", "reconstruction", "error"] | None = None,
+    color: Literal["radius", "plain"] = "radius",
+    camera: str | Sequence[float] | None = None,
+    up: str | Sequence[float] | None = None,
+    zoom: float = 1.0,
+    size: tuple[int, int] = (800, 600),
+    background: str = "white",
+    max_error: float | None = None,
+    tolerance: float = 0.01,
+    names: Sequence[str] | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Picture:
+    """Draws a surface and medial meshes of it, without GPU or display.
+
+    Args:
+        mesh: The surface; or a medial mesh, which is drawn in its surface.
+        axes: Medial meshes of it. Several give a strip: a panel for each, from the same camera.
+        show: What is drawn. `axis` unless there is none, then `surface`. `error` is the reconstruction, coloured by its
+            distance to the surface.
+        color: What a medial mesh is coloured by: its radii, or one colour for sheets and one for curves.
+        camera: `front`, `back`, `left`, `right`, `top`, `bottom`, `iso`; azimuth and elevation in degrees; or the direction
+            from the shape to the eye. By default the direction that shows most of the shape.
+        up: `x`, `y`, `z`, `-x`, `-y`, `-z`, or a direction.
+        zoom: 1: the shape fills the picture; 2: twice as large.
+        size: Width and height in pixels, of a strip's panel.
+        background: `white`, `black`, `transparent` or `#rrggbb`.
+        max_error: End of the scale of errors, a fraction of the diagonal.
+        tolerance: Largest distance of a drawn reconstruction from the boundary of the union, a fraction of the diagonal.
+        names: Captions of a strip, one for each medial mesh; by default the method.
+        threads: Threads of a pool of its own; by default all calls share one.
+        progress: Called with a stage and its completed share.
+
+    Returns:
+        The picture. A notebook shows it; `.save` writes it.
+
+    Raises:
+        ParameterError: An option is wrong.
+        InputError: A reconstruction cannot be made, or a medial mesh has no surface.
+
+    Example:
+        >>> from medial_axis import Mesh, render
+        >>> axis = Mesh.read("builtin:box").medial_axis()
+        >>> picture = render(axis, show="error", size=(320, 240))
+        >>> picture.width, picture.height, picture.png[1:4]
+        (320, 240, b'PNG')
+    """
+    from .axis import MedialAxis
+
+    drawn = [axes] if isinstance(axes, MedialAxis) else list(axes)
+    if isinstance(mesh, MedialAxis):
+        drawn.insert(0, mesh)
+        if mesh.mesh is None:
+            raise InputError("render: this medial axis has no surface; read it with Mesh.read_axis")
+        mesh = mesh.mesh
+    if not isinstance(mesh, Mesh) or not all(isinstance(axis, MedialAxis) for axis in drawn):
+        raise InputError("render: give a Mesh and MedialAxis objects")
+    mesh._solid()
+    captions = [_caption(axis) for axis in drawn] if names is None else [str(name) for name in names]
+    if len(captions) != len(drawn):
+        raise ParameterError(f"names: {len(captions)} for {len(drawn)} medial meshes")
+    options = {
+        "show": show,
+        "color": color,
+        "camera": camera,
+        "up": up,
+        "zoom": zoom,
+        "size": "x".join(map(str, size)) if isinstance(size, (tuple, list)) else size,
+        "background": background,
+        "max-error": max_error,
+        "tolerance": tolerance,
+    }
+    words = [f"--{key}={_word(value)}" for key, value in options.items() if value is not None]
+    layers = [(name, axis._axis) for name, axis in zip(captions, drawn)]
+    png, facts = _medial.render(mesh._surface, layers, words, call(0, threads, progress))
+    told = json.loads(facts)
+    return Picture(
+        png, told["width"], told["height"], tuple(told["direction"]), tuple(told["up"]), tuple(told["errors"])
+    )
+
+
+def _word(value: Any) -> str:
+    return value if isinstance(value, str) else ",".join(map(str, value)) if isinstance(value, Iterable) else str(value)
+
+
+def _caption(axis: MedialAxis) -> str:
+    return "medial axis" if axis.run is None else axis.run.method
+
+
+def plot(what: Mesh | MedialAxis, backend: Backend | None, screenshot: str | os.PathLike[str] | None) -> Any:
+    """A window, or a cell of a notebook, of PyVista; else a `Picture`."""
+    if backend not in (None, "pyvista", "png"):
+        raise ParameterError(f"backend: pyvista or png is needed, not {backend!r}")
+    if backend == "png" or (backend is None and importlib.util.find_spec("pyvista") is None):
+        picture = render(what)
+        if screenshot is not None:
+            picture.save(screenshot)
+        return picture
+    plotter = need("pyvista", "PyVista").Plotter(off_screen=screenshot is not None)
+    surface = what if isinstance(what, Mesh) else what.mesh
+    if surface is not None:
+        plotter.add_mesh(surface.to_pyvista(), color="white", opacity=1.0 if surface is what else 0.15)
+    if surface is not what:
+        plotter.add_mesh(what.to_pyvista(), scalars="radius", line_width=3, show_edges=True, edge_color="gray")
+    return plotter.show(screenshot=False if screenshot is None else path_text(screenshot))
+
+
+def small_png(what: Mesh | MedialAxis) -> bytes | None:
+    """The picture of an object in a notebook; None where it cannot be drawn."""
+    try:
+        return render(what, size=(480, 360)).png
+    except MedialError:
+        return None
+
+
+def to_html(png: bytes | None, rows: Mapping[str, object]) -> str:
+    """A picture and a table."""
+    cells = (
+        f"<tr><th style='text-align:left'>{html.escape(name)}</th>"
+        f"<td style='text-align:left'>{html.escape(str(value))}</td></tr>"
+        for name, value in rows.items()
+    )
+    image = ""
+    if png is not None:
+        image = f"<img width='480' height='360' src='data:image/png;base64,{base64.b64encode(png).decode()}'/>"
+    return f"<div>{image}<table>{''.join(cells)}</table></div>"
