@@ -8,13 +8,14 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 from . import _plugins
-from ._arguments import need, path_text
+from ._arguments import Progress, need, path_text
 from ._command import STARTED_BY
 from .errors import FailedError, InputError, ParameterError
 from .mesh import Mesh
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _RESULTS = "results.csv"
+
+# How the command announces an item: its number, their number, mesh and method, and an estimate.
+_BEGUN = re.compile(r"\[(\d+)/(\d+)\] (.*?)(?:, about .* left)?$")
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,8 @@ class Report:
     """What the command printed."""
     complete: bool
     """Whether nothing failed. Results may still be off the count, unsupported or skipped."""
+    reasons: tuple[str, ...] = ()
+    """Why results are missing, and other remarks of the command."""
 
     @property
     def page(self) -> Path:
@@ -42,7 +48,19 @@ class Report:
         return self.folder / "index.html"
 
     def frame(self) -> pd.DataFrame:
-        """All results of the folder; see `load`."""
+        """All results of the folder, as `load` gives them.
+
+        Returns:
+            A row for each result, with the columns of `results.csv`.
+
+        Raises:
+            ImportError: pandas is not installed.
+
+        Example:
+            >>> report = compare("builtin:box", methods="qmat", spheres=[100, 50], quiet=True)
+            >>> report.frame().status.unique()  # doctest: +SKIP
+            array(['ok'], dtype=object)
+        """
         return load(self.folder)
 
 
@@ -54,18 +72,48 @@ def compare(
     out: str | os.PathLike[str] = "medial-report",
     params: Mapping[str, Mapping[str, Any]] | None = None,
     timeout: float | None = None,
+    budget: float | None = None,
     memory: float | None = None,
+    jobs: int | None = None,
     threads: int | None = None,
     arguments: Sequence[str] = (),
     quiet: bool = False,
+    progress: bool | Progress = False,
 ) -> Report:
-    """Runs methods on meshes, measures, and writes tables, plots and a page into the folder `out`.
+    """Runs methods on meshes, measures, and writes tables, plots and a page, as `medial compare` does.
 
-    The same as `medial compare`, in processes of its own: each item has limits of time (`timeout`, seconds) and memory
-    (`memory`, MB), and results accumulate in the folder. `meshes` are paths, names (`builtin:torus`) or `Mesh`es; without
-    any, three built-in shapes. `methods` are ids or classes that `simplifier` registered; without any, all but those on
-    request. `params` sets parameters by method. `arguments` are further words of the command, such as
-    `["--repeat", "3"]`.
+    It runs in processes of its own, with limits for each item. Results accumulate in the folder: the same call again runs
+    only missing items, also after Ctrl-C.
+
+    Args:
+        meshes: Paths, names (`builtin:torus`) or `Mesh` objects, or one of them; by default three built-in shapes.
+        methods: Ids, or classes that `simplifier` registered; by default all but those on request.
+        spheres: Counts.
+        out: The folder.
+        params: Parameters by method.
+        timeout: Seconds after which an item ends.
+        budget: Seconds on a mesh after which a method begins no further level.
+        memory: Megabytes above which an item ends.
+        jobs: Items at the same time; with several, seconds are in no table.
+        threads: Threads; by default all processors.
+        arguments: Further words of the command, such as `["--repeat", "3"]`.
+        quiet: Print only reasons of missing results.
+        progress: True shows one line that updates, on standard error or in a notebook; or a function, which is called with
+            the mesh and method that begins and the completed share. By default a line for each.
+
+    Returns:
+        The folder of results; `complete` if nothing failed.
+
+    Raises:
+        InputError: A mesh is rejected, with the reasons of all that are.
+        ParameterError: A word of the command is wrong.
+        FailedError: There is no result at all, with the reasons.
+
+    Example:
+        >>> from medial_axis import compare
+        >>> report = compare("builtin:box", methods="qmat", spheres=[100, 50], quiet=True)
+        >>> report.complete, report.page.is_file()
+        (True, True)
     """
     if _plugins.loading is not None:
         raise FailedError(
@@ -84,22 +132,39 @@ def compare(
     for id, values in (params or {}).items():
         for key, value in values.items():
             words += ["--set", f"{id}.{key}={_word(value)}"]
-    for name, limit in [("timeout", timeout), ("memory", memory), ("threads", threads)]:
+    limits = {"timeout": timeout, "budget": budget, "memory": memory, "jobs": jobs, "threads": threads}
+    for name, limit in limits.items():
         if limit is not None:
             words += [f"--{name}", str(limit)]
     words += [str(word) for word in arguments]
-    code, printed, errors = _run(words, quiet)
-    if code in (0, 3):
-        return Report(folder, printed, complete=code == 0)
+    code, printed, errors = _run(words, quiet, Line() if progress is True else progress or None)
     # All reasons that the command printed, without its lines of progress.
     lines = [line.removeprefix("medial: ") for line in errors.splitlines() if line.strip()]
-    reasons = [line for line in lines if not re.match(r"\[\d+/\d+\] ", line)]
+    reasons = tuple(line for line in lines if not _BEGUN.match(line))
+    if code in (0, 3):
+        return Report(folder, printed, complete=code == 0, reasons=reasons)
     why = "\n".join(reasons) or f"exit code {code}"
     raise {1: InputError, 2: ParameterError}.get(code, FailedError)(why)
 
 
 def load(folder: str | os.PathLike[str] = "medial-report") -> pd.DataFrame:
-    """The results of a folder as a frame of pandas: a row for each result, with the columns of `results.csv`."""
+    """The results of a folder as a frame of pandas.
+
+    Args:
+        folder: What `compare` wrote.
+
+    Returns:
+        A row for each result, with the columns of `results.csv`.
+
+    Raises:
+        InputError: There are no results.
+        ImportError: pandas is not installed.
+
+    Example:
+        >>> report = compare("builtin:box", methods="qmat", spheres=[100, 50], quiet=True)
+        >>> sorted(load(report.folder).method.unique())  # doctest: +SKIP
+        ['initial', 'qmat']
+    """
     pandas = need("pandas", "pandas")
     path = Path(path_text(folder, "folder")) / _RESULTS
     if not path.is_file():
@@ -142,34 +207,82 @@ def _word(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def _run(words: list[str], quiet: bool) -> tuple[int, str, str]:
+def _run(words: list[str], quiet: bool, progress: Line | Progress | None) -> tuple[int, str, str]:
     """Runs the command: its exit code and what it printed. Ctrl-C ends it as it ends the command itself."""
-    command = [*STARTED_BY, *words, *(["--quiet"] if quiet else [])]
+    # Its lines of progress are needed for that of the caller.
+    command = [*STARTED_BY, *words, *(["--quiet"] if quiet and progress is None else [])]
     # Of a session of its own: a terminal would interrupt it once, and this function a second time.
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
+    printed: list[str] = []
     errors: list[str] = []
-    relay = threading.Thread(target=_relay, args=(process.stderr, errors, quiet), daemon=True)
-    relay.start()
-    assert process.stdout is not None
+    assert process.stdout is not None and process.stderr is not None
+    # A pipe that is not emptied would stop the command.
+    empty = threading.Thread(target=lambda out: printed.append(out.read()), args=(process.stdout,), daemon=True)
+    empty.start()
     try:
-        printed = process.stdout.read()
+        # What the command says while it runs is shown by this thread, where a notebook shows it too.
+        for line in process.stderr:
+            errors.append(line)
+            begun = _BEGUN.match(line)
+            if begun and progress is not None:
+                done, total = int(begun[1]) - 1, int(begun[2])
+                if isinstance(progress, Line):
+                    progress.at(done, total, begun[3])
+                else:
+                    progress(begun[3], done / total)
+            elif not quiet:
+                sys.stderr.write(line)
+                sys.stderr.flush()
         process.wait()
+        if progress is not None and process.returncode in (0, 3):
+            progress.end() if isinstance(progress, Line) else progress("done", 1.0)
     except BaseException:
         process.send_signal(signal.SIGINT)
         process.wait()
         raise
-    relay.join(timeout=5)
-    if printed and not quiet:
-        print(printed, end="")
-    return process.returncode, printed, "".join(errors)
+    finally:
+        if isinstance(progress, Line):
+            progress.close()
+    empty.join(timeout=5)
+    text = "".join(printed)
+    if text and not quiet:
+        print(text, end="")
+    return process.returncode, text, "".join(errors)
 
 
-def _relay(stream: IO[str] | None, kept: list[str], quiet: bool) -> None:
-    """Shows what the command says while it runs, where a notebook shows it too, and keeps it."""
-    for line in stream or ():
-        kept.append(line)
-        if not quiet:
-            sys.stderr.write(line)
+class Line:
+    """A line on standard error that updates, by the conventions of tqdm, in a terminal and in a notebook."""
+
+    def __init__(self) -> None:
+        self._start, self._total, self._width = time.monotonic(), 0, 0
+
+    def at(self, done: int, total: int, stage: str) -> None:
+        """Shows that `done` of `total` items are done, and the current one."""
+        spent = time.monotonic() - self._start
+        share, self._total = done / total, total
+        left = _clock(spent / share - spent) if done else "?"
+        bar = "\u2588" * int(10 * share)
+        text = f"compare: {share:4.0%}|{bar:10}| {done}/{total} [{_clock(spent)}<{left}, {stage}]"
+        # What a longer line left is overwritten.
+        sys.stderr.write("\r" + text.ljust(self._width))
+        sys.stderr.flush()
+        self._width = len(text)
+
+    def end(self) -> None:
+        """Shows that all items are done."""
+        if self._total > 0:
+            self.at(self._total, self._total, "done")
+
+    def close(self) -> None:
+        """Ends the line, so that others follow it."""
+        if self._width > 0:
+            sys.stderr.write("\n")
             sys.stderr.flush()
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes:02}:{rest:02}"

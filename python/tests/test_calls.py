@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -124,3 +127,32 @@ def test_a_thousand_calls_leave_nothing_behind() -> None:
     before = resident_bytes()
     calls(200)
     assert resident_bytes() - before < 20_000_000, "a thousand calls and errors"
+
+
+def test_a_comparison_shows_one_line_that_updates(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    def run(out: str, progress: bool | Callable[[str, float | None], object]) -> str:
+        medial_axis.compare(
+            "builtin:box", methods=["qmat", "hem"], spheres=20, out=tmp_path / out, quiet=True, progress=progress
+        )
+        return capfd.readouterr().err
+
+    shown = run("line", True)
+    assert shown.count("\n") == 1 and shown.endswith("\n"), "one line"
+    states = shown.rstrip("\n").split("\r")[1:]
+    assert len(states) == 4 and all(state.startswith("compare: ") for state in states)
+    assert "box: qmat" in "".join(states) and "left" not in shown
+    assert re.fullmatch(r"compare:   0%\|          \| 0/3 \[00:\d\d<\?, box: initial\]", states[0]), states[0]
+    assert re.match(r"compare: 100%\|█{10}\| 3/3 \[00:\d\d<00:00, done\]", states[-1]), states[-1]
+    told: list[tuple[str, float | None]] = []
+    assert run("function", lambda stage, share: told.append((stage, share))) == ""
+    assert [share for _, share in told] == [0, 1 / 3, 2 / 3, 1] and told[0][0].startswith("box: ")
+
+    def refuse(stage: str, share: float | None) -> None:
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        run("refused", refuse)
+    # Reasons of missing results come after the line.
+    (tmp_path / "open.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    with pytest.raises(medial_axis.MedialError, match="open.*refused"):
+        medial_axis.compare(tmp_path / "open.off", methods="qmat", out=tmp_path / "open", quiet=True, progress=True)

@@ -184,3 +184,11 @@ def test_hundreds_of_hostile_calls(blob: Mesh, axis: MedialAxis) -> None:
         attempt(lambda: MedialAxis(one, other))
     assert calls > 1000
     assert len(axis.simplify("qmat", spheres=5)) == 5
+
+
+def test_reasons_of_a_partial_comparison(tmp_path: Path) -> None:
+    (tmp_path / "open.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    report = medial_axis.compare(
+        [tmp_path / "open.off", "builtin:box"], methods="qmat", spheres=20, out=tmp_path / "out", quiet=True
+    )
+    assert not report.complete and any("open" in reason for reason in report.reasons), report.reasons
