@@ -200,6 +200,7 @@ class Evaluation:
             ValueError: The field is no length.
 
         Example:
+            >>> from medial_axis import Mesh
             >>> found = Mesh.read("builtin:box").medial_axis().evaluate(samples=1000)
             >>> found.in_units("hausdorff") == found.hausdorff * found.diagonal
             True
@@ -216,6 +217,7 @@ class Evaluation:
             Values by column; columns without a value are left out.
 
         Example:
+            >>> from medial_axis import Mesh
             >>> axis = Mesh.read("builtin:box").medial_axis()
             >>> rows = [axis.simplify("qmat", spheres=n).evaluate(samples=1000).row() for n in (40, 20)]
             >>> [(row["mesh"], row["method"], row["spheres"]) for row in rows]

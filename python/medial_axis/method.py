@@ -83,8 +83,8 @@ class Simplified:
 class Shape:
     """A surface as a method sees it: normalised to a bounding-box diagonal of 1.
 
-    What is asked of it is built once for all methods of a comparison, and its cost is told beside each that used it. So
-    build nothing yourself that it has.
+    Its arrays are substrates: built once for all methods of a comparison and charged to each that uses them. Do not
+    rebuild them.
     """
 
     def __init__(self, handle: _medial.ShapeHandle) -> None:
@@ -105,27 +105,87 @@ class Shape:
         return self._handle.expected_betti
 
     def vertices(self) -> FloatArray:
-        """Positions, n x 3; a new array each time."""
+        """Positions.
+
+        Returns:
+            An n x 3 array, new each time.
+
+        Example:
+            shape.vertices().mean(axis=0)
+        """
         return self._handle.vertices()
 
     def faces(self) -> IndexArray:
-        """Triangles, n x 3, counter-clockwise from outside; a new array each time."""
+        """Triangles, counter-clockwise from outside.
+
+        Returns:
+            An n x 3 array of indices, new each time.
+
+        Example:
+            shape.vertices()[shape.faces()]
+        """
         return self._handle.faces()
 
     def samples(self) -> FloatArray:
-        """Boundary samples, n x 3; a new array each time."""
+        """Boundary samples.
+
+        Returns:
+            An n x 3 array, new each time.
+
+        Raises:
+            FailedError: They cannot be made.
+
+        Example:
+            scipy.spatial.KDTree(shape.samples())
+        """
         return self._handle.samples()
 
     def initial(self) -> MedialAxis:
-        """The medial mesh that every method starts from."""
+        """The medial mesh that every method starts from.
+
+        Returns:
+            A medial mesh, in diagonals.
+
+        Raises:
+            FailedError: It cannot be made.
+
+        Example:
+            self.axis = shape.initial()
+        """
         return MedialAxis._of(self._handle.initial(), None)
 
     def inside(self, points: Any) -> BoolArray:
-        """Which of n points are inside."""
+        """Which of n points are inside.
+
+        Args:
+            points: n x 3 positions, in diagonals.
+
+        Returns:
+            n truth values.
+
+        Raises:
+            InputError: `points` is no n x 3 array of finite numbers.
+
+        Example:
+            points[shape.inside(points)]
+        """
         return self._handle.inside(floats(points, "points"))
 
     def distances(self, points: Any) -> FloatArray:
-        """The distances of n points to the surface."""
+        """The distances of n points to the surface.
+
+        Args:
+            points: n x 3 positions, in diagonals.
+
+        Returns:
+            n distances, in diagonals, without a sign.
+
+        Raises:
+            InputError: `points` is no n x 3 array of finite numbers.
+
+        Example:
+            radii = shape.distances(centres)
+        """
         return self._handle.distances(floats(points, "points"))
 
 
@@ -146,7 +206,18 @@ class RunContext:
         return self._handle.threads
 
     def step(self, done: int, total: int) -> None:
-        """Reports progress; raises `CancelledError` once the run is to stop. Call it now and then."""
+        """Reports progress. Call it now and then.
+
+        Args:
+            done: Completed steps.
+            total: Number of steps.
+
+        Raises:
+            CancelledError: The run is to stop.
+
+        Example:
+            run.step(len(centres), level.spheres)
+        """
         self._handle.step(done, total)
 
 
@@ -157,6 +228,18 @@ _ID = re.compile(r"[a-z0-9-]+")
 def simplifier(cls: _Class) -> _Class:
     """Makes a class a method, for `MedialAxis.simplify`, `compare`, and `medial compare --plugins FILE.py`.
 
+    All lengths are fractions of the bounding-box diagonal, those of results too.
+
+    Args:
+        cls: A class with `info`, `prepare` and `at`.
+
+    Returns:
+        The same class.
+
+    Raises:
+        ParameterError: One of the three is missing or wrong.
+
+    Example:
         @medial_axis.simplifier
         class Largest:
             info = medial_axis.MethodInfo(id="largest", title="Largest balls first")
@@ -171,8 +254,6 @@ def simplifier(cls: _Class) -> _Class:
                 keep = np.zeros(len(self.axis), bool)
                 keep[self.order[: level.spheres]] = True
                 return self.axis.induced(keep)       # a MedialAxis, or Simplified
-
-    All lengths are fractions of the bounding-box diagonal, those of results too.
     """
     info = getattr(cls, "info", None)
     name = getattr(cls, "__qualname__", repr(cls))
@@ -197,7 +278,16 @@ def registered() -> dict[str, type[Any]]:
 
 
 def methods() -> dict[str, dict[str, Any]]:
-    """The methods of the program by their ids: titles, citations, levels, parameters with units and defaults."""
+    """The methods of the program.
+
+    Returns:
+        By id: title, citation, native level, and parameters with units and defaults.
+
+    Example:
+        >>> from medial_axis import methods
+        >>> methods()["angle"]["native"]["unit"]
+        'degrees of separation angle'
+    """
     return {info["id"]: info for info in json.loads(_medial.methods())}
 
 

@@ -29,9 +29,24 @@ def triangulate(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Triangulation:
-    """The Delaunay triangulation of n x 3 points, or the regular one where they have weights (squared radii).
+    """The Delaunay triangulation of points, or the regular one of weighted points; exact, for any input.
 
-    Exact, for any input. An array of float64, contiguous, is read where it is: it must not change meanwhile.
+    Args:
+        points: n x 3 positions. A contiguous array of float64 is read in place: it must not change meanwhile.
+        weights: n squared radii.
+        threads: Threads of a pool of its own; by default all calls share one.
+        progress: Called with a stage and its completed share.
+
+    Returns:
+        Tetrahedra, hidden points and repeated points, as indices of `points`.
+
+    Raises:
+        InputError: There are fewer than four points, all are in a plane, or an array is wrong.
+
+    Example:
+        >>> from medial_axis import triangulate
+        >>> triangulate([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]).cells.shape
+        (1, 4)
     """
     sites = floats(points, "points")
     heights = None if weights is None else floats(weights, "weights", None)
@@ -44,17 +59,65 @@ def triangulate(
 def closest_points(
     mesh: Mesh, points: Any, *, threads: int | None = None
 ) -> tuple[FloatArray, FloatArray, IndexArray]:
-    """For each of n points the closest one of a surface (n x 3), its distance (n) and its face (n)."""
+    """The closest point of a surface for each of n points.
+
+    Args:
+        mesh: The surface.
+        points: n x 3 positions.
+        threads: Threads of a pool of its own; by default all calls share one.
+
+    Returns:
+        Closest points (n x 3), distances (n, in the unit of the mesh) and faces (n).
+
+    Raises:
+        InputError: `mesh` is no Mesh, or `points` no n x 3 array of finite numbers.
+
+    Example:
+        >>> from medial_axis import Mesh, closest_points
+        >>> closest, distances, faces = closest_points(Mesh.read("builtin:box"), [[0, 0, 9]])
+        >>> distances.shape, faces.shape
+        ((1,), (1,))
+    """
     return _mesh(mesh).closest_points(points, threads=threads)
 
 
 def signed_distance(mesh: Mesh, points: Any, *, threads: int | None = None) -> FloatArray:
-    """The distance of each point to a surface: negative inside, with an exact sign."""
+    """The distance of each of n points to a surface: negative inside, with an exact sign.
+
+    Args:
+        mesh: The surface.
+        points: n x 3 positions.
+        threads: Threads of a pool of its own; by default all calls share one.
+
+    Returns:
+        n distances, in the unit of the mesh.
+
+    Raises:
+        InputError: `mesh` is no Mesh that bounds a solid, or `points` no n x 3 array of finite numbers.
+
+    Example:
+        >>> (signed_distance(Mesh.read("builtin:box"), [[0, 0, 0], [0, 0, 9]]) > 0).tolist()
+        [False, True]
+    """
     return _mesh(mesh).signed_distance(points, threads=threads)
 
 
 def betti(axis: MedialAxis) -> tuple[int, int, int]:
-    """Components, tunnels and cavities of a medial mesh, over Z2."""
+    """Components, tunnels and cavities of a medial mesh, over Z2.
+
+    Args:
+        axis: The medial mesh.
+
+    Returns:
+        The Betti numbers b0, b1 and b2.
+
+    Raises:
+        InputError: `axis` is no MedialAxis.
+
+    Example:
+        >>> betti(Mesh.read("builtin:torus").medial_axis())
+        (1, 1, 0)
+    """
     if not isinstance(axis, MedialAxis):
         raise InputError(f"betti: a MedialAxis is needed, not a {type(axis).__name__}")
     return axis.betti
