@@ -169,7 +169,8 @@ def load(folder: str | os.PathLike[str] = "medial-report") -> pd.DataFrame:
     path = Path(path_text(folder, "folder")) / _RESULTS
     if not path.is_file():
         raise InputError(f"{path}: there are no results; `compare` or `medial compare` makes them")
-    frame: pd.DataFrame = pandas.read_csv(path, low_memory=False)
+    # Its many columns are one block in a copy, so that others can be added.
+    frame: pd.DataFrame = pandas.read_csv(path, low_memory=False).copy()
     return frame
 
 

@@ -77,7 +77,7 @@ class Mesh:
         """Reads a file or a built-in shape.
 
         Args:
-            path: An OFF, OBJ, PLY, STL or GLB file; `builtin:ID`, a solid with a known axis; or `dataset:NAME`.
+            path: An OFF, OBJ, PLY or STL file; `builtin:ID`, a solid with a known axis; or `dataset:NAME`.
             threads: Threads of a pool of its own; by default all calls share one.
             progress: Called with a stage and its completed share.
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import ast
+import base64
 import contextlib
 import io
 import json
@@ -50,6 +51,35 @@ def test_outputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     notebook = json.loads(NOTEBOOK.read_text())
     assert run_cells(sources(notebook)) == stored(notebook)
     assert (tmp_path / "errors.png").stat().st_size > 10_000
+
+
+CELLS = [
+    "from medial_axis import Mesh, compare, render\nmesh = Mesh.read('builtin:blob')\nmesh",
+    "axis = mesh.medial_axis().simplify('qmat', spheres=100)\naxis",
+    "render(axis, show='error')",
+    "axis.plot(backend='png')",
+    "report = compare('builtin:box', methods='qmat', spheres=20, quiet=True, progress=True)",
+]
+
+
+def test_objects_in_a_notebook(tmp_path: Path) -> None:
+    """A notebook in a kernel of its own shows pictures, and a comparison as a line that updates."""
+    nbformat = pytest.importorskip("nbformat")
+    nbclient = pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in CELLS])
+    nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    outputs = [cell.outputs for cell in notebook.cells]
+    for [shown], words in zip(outputs[:2], (["blob", "faces"], ["qmat", "Betti numbers", "(1, 0, 0)"])):
+        page = shown.data["text/html"]
+        assert "data:image/png;base64," in page and all(word in page for word in words)
+    pictures = [shown.data["image/png"] for [shown] in outputs[:4]]
+    assert len(set(pictures)) == 4
+    for number, picture in enumerate(pictures):
+        (tmp_path / f"{number}.png").write_bytes(base64.b64decode(picture))
+        assert (tmp_path / f"{number}.png").read_bytes().startswith(b"\x89PNG")
+    lines = "".join(output.text for output in outputs[4])
+    assert lines.count("\n") == 1 and "2/2" in lines, lines
 
 
 def store() -> None:
