@@ -166,12 +166,17 @@ def plot(what: Mesh | MedialAxis, backend: Backend | None, screenshot: str | os.
     if surface is not None:
         plotter.add_mesh(surface.to_pyvista(), color="white", opacity=1.0 if surface is what else 0.15)
     if surface is not what:
-        plotter.add_mesh(what.to_pyvista(), scalars="radius", line_width=3, show_edges=True, edge_color="gray")
+        look = {"line_width": 3, "show_edges": True, "edge_color": "gray", "scalar_bar_args": {"vertical": True}}
+        plotter.add_mesh(what.to_pyvista(), scalars="radius", **look)
+    if surface is not None and surface.problem is None:
+        # The same side as on other pictures.
+        view = render(surface, size=(32, 32))
+        plotter.view_vector(view.direction, viewup=view.up)
     return plotter.show(screenshot=False if screenshot is None else path_text(screenshot))
 
 
 def small_png(what: Mesh | MedialAxis) -> bytes | None:
-    """The picture of an object in a notebook; None where it cannot be drawn."""
+    """The picture of an object in a notebook; None where it cannot be drawn, such as a medial mesh without a surface."""
     try:
         return render(what, size=(480, 360)).png
     except MedialError:
