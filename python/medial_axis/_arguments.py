@@ -99,6 +99,11 @@ def indices(value: Any, what: str, columns: int) -> IndexArray:
     return np.ascontiguousarray(array, dtype=np.uint32)
 
 
+def same(ones: tuple[Any, ...], others: tuple[Any, ...]) -> bool:
+    """Whether arrays are equal bit by bit, as their hashes take them: 0.0 is not -0.0."""
+    return all(one.shape == other.shape and one.tobytes() == other.tobytes() for one, other in zip(ones, others))
+
+
 def truths(value: Any, what: str, count: int) -> BoolArray:
     """`count` truth values."""
     array = _array(value, what)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from . import _medial
-from ._arguments import FloatArray, IndexArray, Progress, call, floats, indices, need, path_text, real, truths, whole
+from ._arguments import FloatArray, IndexArray, Progress, call, floats, indices, need, path_text, real, same, truths, whole
 from ._methods import typed
 from .errors import InputError, MedialWarning, ParameterError
 from .evaluation import Evaluation
@@ -537,7 +537,7 @@ class MedialAxis:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, MedialAxis):
             return NotImplemented
-        return self is other or all(map(np.array_equal, self._arrays(), other._arrays()))
+        return self is other or same(self._arrays(), other._arrays())
 
     def __hash__(self) -> int:
         return hash(tuple(array.tobytes() for array in self._arrays()))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from . import _medial
-from ._arguments import FloatArray, IndexArray, Progress, call, floats, indices, need, path_text, whole
+from ._arguments import FloatArray, IndexArray, Progress, call, floats, indices, need, path_text, same, whole
 from .errors import InputError, ParameterError
 
 if TYPE_CHECKING:
@@ -442,7 +442,7 @@ class Mesh:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Mesh):
             return NotImplemented
-        return self is other or all(map(np.array_equal, self._arrays(), other._arrays()))
+        return self is other or same(self._arrays(), other._arrays())
 
     def __hash__(self) -> int:
         return hash(tuple(array.tobytes() for array in self._arrays()))

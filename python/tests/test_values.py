@@ -22,6 +22,8 @@ def test_equality_is_that_of_the_arrays(blob: Mesh, axis: MedialAxis) -> None:
     assert moved != blob and blob != "blob" and axis != blob
     assert again.medial_axis() == axis and hash(again.medial_axis()) == hash(axis)
     assert axis.simplify("qmat", spheres=30) != axis
+    zero, negative = (MedialAxis([[0.0, x, 0.0]], [1.0]) for x in (0.0, -0.0))
+    assert zero != negative, "as their hashes"
     found = axis.evaluate(samples=100)
     assert {found: 1}[axis.evaluate(samples=100)] == 1 and found != axis.evaluate(samples=200)
 
