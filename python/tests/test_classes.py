@@ -42,6 +42,7 @@ def test_in_this_process(axis: MedialAxis) -> None:
 
 
 def test_in_a_comparison(tmp_path: Path) -> None:
+    pytest.importorskip("pandas")
     report = medial_axis.compare(
         ["builtin:box"],
         methods=[Largest, "qmat"],
@@ -165,6 +166,7 @@ def test_what_goes_wrong_is_a_row_of_the_table(tmp_path: Path) -> None:
 def test_files_of_the_user_are_not_taken_for_modules(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    pytest.importorskip("pandas")
     for name in ("numpy", "random", "medial_axis", "errors", "json"):
         (tmp_path / f"{name}.py").write_text("raise RuntimeError('not me')")
     monkeypatch.chdir(tmp_path)
