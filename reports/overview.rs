@@ -39,7 +39,10 @@ pub(crate) fn overview_table(
     let mean = |row: &SeriesSummary, metric: &Metric| {
         let rises = metric.key == HAUSDORFF.key && row.rising;
         let mark = if rises { RISING } else { "" };
-        Cell::optional(row.mean(metric).map(|mean| metric.format_mean(mean) + mark))
+        let text = row.mean(metric).map(|mean| metric.format_mean(mean));
+        // Means over fewer meshes do not compare with the others.
+        let is_over_all = row.over == summary.meshes;
+        Cell::optional(text.map(|t| if is_over_all { t + mark } else { format!("({t}){mark}") }))
     };
     let table = Table::of(&rows)
         .text("method", |row| comparison.series[row.series].as_str())
@@ -63,6 +66,9 @@ pub(crate) fn overview_table(
     let over = if is_one { "" } else { ", geometric means" };
     let right = "topology: results with the Betti numbers of the solid";
     let mut notes = vec![format!("Errors in % of the diagonal{over}; {right}.")];
+    if rows.iter().any(|row| row.over < summary.meshes) {
+        notes.push("In parentheses: means over fewer meshes, which do not compare.".to_owned());
+    }
     let has_rising = rows.iter().any(|row| row.rising);
     notes.extend(has_rising.then(|| RISING_NOTE.to_owned()));
     let missing: Vec<String> =
