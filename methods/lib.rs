@@ -33,25 +33,25 @@ pub fn registry() -> Vec<Registered> {
     let methods = vec![
         Registered::from(angle::method())
             .best_for(
-                "Dense samples, when the axis is to stay where it is and only its spikes go, \
-                 on small and large parts alike; not for few spheres, and the topology may \
-                 break (the variant homotopy keeps it).",
+                "Removing spikes alone from the axis of dense samples, on small and large parts \
+                 alike; not for few spheres, and the topology may break (the variant homotopy \
+                 keeps it).",
             )
             .filter(Level::Published)
             .sweep(&[30.0, 45.0, 60.0, 90.0, 120.0]),
         Registered::from(lambda::method())
             .best_for(
-                "Dense samples, when whatever is small in absolute size is to go, with a \
-                 proof that what stays is stable; not where thin parts must stay beside \
-                 thick ones, and not for few spheres.",
+                "Removing what is small in absolute size from the axis of dense samples, with a \
+                 proof that the rest is stable; not where thin parts must stay next to thick \
+                 ones, and not for few spheres.",
             )
             .filter(Level::Published)
             .sweep(&[0.005, 0.01, 0.02]),
         Registered::from(dey_zhao::method())
             .best_for(
-                "Dense samples, when one pair of constants is to do for every shape and \
-                 every density; with denser samples it converges to the medial axis, but it \
-                 promises no topology, and is not for few spheres.",
+                "Dense samples of any shape with one pair of constants; with denser samples it \
+                 converges to the medial axis, but it promises no topology, and is not for few \
+                 spheres.",
             )
             .filter(Level::Published)
             .sweep(&[1.0, 1.5, 2.0, 3.0]),
@@ -73,9 +73,9 @@ pub fn registry() -> Vec<Registered> {
             .sweep(&[0.01, 0.02, 0.04, 0.08]),
         Registered::from(sat::method())
             .best_for(
-                "Features that are small beside what is around them, when they are to go and \
-                 equally small ones elsewhere to stay; gaps may fill, spheres are new ones, \
-                 and it is not for few spheres.",
+                "Removing features that are small for their surroundings, while equally small \
+                 ones elsewhere stay; gaps may fill, spheres are new ones, and it is not for few \
+                 spheres.",
             )
             .filter(Level::Published)
             .sweep(&[1.1, 1.25, 1.5, 2.0]),
@@ -84,9 +84,8 @@ pub fn registry() -> Vec<Registered> {
             .sweep(&[1.1, 1.25, 1.5, 2.0]),
         Registered::from(tam_heidrich::method())
             .best_for(
-                "Whole features of little volume, when they are to go and loops to stay, and \
-                 a surface is to be rebuilt by the power crust; it does not reach small \
-                 numbers of spheres.",
+                "Removing whole features of little volume, while loops stay and a surface is \
+                 rebuilt by the power crust; it does not reach small numbers of spheres.",
             )
             .filter(Level::Published)
             .sweep(&[0.1, 1.0, 5.0]),

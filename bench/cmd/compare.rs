@@ -87,10 +87,10 @@ pub struct Arguments {
     /// End an item after so many seconds [default: 300].
     #[arg(long, value_name = "SECONDS")]
     timeout: Option<f64>,
-    /// Begin no further level of a method on a mesh after so many seconds: such levels are `skipped` [default: 60].
+    /// Seconds after which a method begins no further level on a mesh; the others are `skipped` [default: 60].
     #[arg(long, value_name = "SECONDS")]
     budget: Option<f64>,
-    /// Run N items at the same time; their seconds stand in no table [default: 1].
+    /// Run N items at the same time; their seconds are in no table [default: 1].
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
     /// Exit with 3 when any result is not as requested, not only after failures.
@@ -190,10 +190,10 @@ pub fn run(
     let Rebuilt { records, files, undrawn, .. } = report.write(None, true)?;
     undrawn.iter().for_each(|why| note(global, why));
     let records = of_items(records, &items);
-    let told: HashSet<String> = left.iter().flat_map(Item::keys).collect();
+    let shown: HashSet<String> = left.iter().flat_map(Item::keys).collect();
     // Those of this run are on the screen.
     let earlier: Vec<Record> =
-        records.iter().filter(|record| !told.contains(&record.key)).cloned().collect();
+        records.iter().filter(|record| !shown.contains(&record.key)).cloned().collect();
     reasons(&earlier).iter().for_each(|reason| print_error(reason));
     finish(&records, [run, found], arguments, &files, global)
 }
@@ -208,7 +208,7 @@ fn methods_of<'i>(items: impl IntoIterator<Item = &'i Item>) -> Vec<String> {
 /// The pages of a run that goes on. They take at most about a tenth of its time.
 struct Pages<'r> {
     report: &'r RunReport<'r>,
-    /// What stands on the next page.
+    /// The state that the next page shows.
     running: Running,
     /// When the next page is due, and the next one with new pictures.
     due: [Instant; 2],

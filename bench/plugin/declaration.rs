@@ -99,7 +99,7 @@ pub(super) struct Declaration {
     pub arguments: Vec<Word>,
     /// Where the program runs, and relative paths start.
     pub folder: PathBuf,
-    /// Files that the program reads beside those that are words of its command.
+    /// Files that the program reads, besides the words of its command.
     pub files: Vec<PathBuf>,
 }
 

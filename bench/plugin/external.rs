@@ -56,8 +56,7 @@ impl External {
         Ok(Self { info, declaration: Arc::new(declaration), fingerprint })
     }
 
-    /// SHA-256 over the declaration and its files: an edited script is not
-    /// taken for the old one.
+    /// SHA-256 over the declaration and its files: an edited script is not taken for the old one.
     pub fn fingerprint(&self) -> &str {
         &self.fingerprint
     }
@@ -356,7 +355,7 @@ fn text_like(value: &Value, default: &str) -> Result<String, &'static str> {
 fn files(declaration: &Declaration) -> impl Iterator<Item = PathBuf> {
     let words = declaration.arguments.iter().filter_map(Word::plain);
     let words = words.map(|word| declaration.folder.join(word));
-    // A program from PATH is part of the machine, one beside the file is part of the plug-in.
+    // A program from PATH is part of the machine, one next to the file is part of the plug-in.
     let own = declaration.written.first().is_some_and(|program| program.contains('/'));
     let program = own.then(|| declaration.program.clone());
     program.into_iter().chain(words).chain(declaration.files.iter().cloned())
@@ -381,6 +380,7 @@ fn fingerprint(declaration: &Declaration) -> io::Result<String> {
 const UNSUPPORTED: i32 = 65;
 /// Bytes of an output; larger ones are refused unread.
 const LARGEST_OUTPUT: u64 = 1_000_000_000;
+
 /// Most resident bytes of a program and its descendants together, as far as they were looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ProgramPeak(pub u64);
