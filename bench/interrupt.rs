@@ -6,6 +6,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::exit::Exit;
+use crate::process_tree;
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 static LISTENING: AtomicBool = AtomicBool::new(false);
@@ -18,6 +19,8 @@ pub fn install() {
         // A flag alone: the handler interrupts other threads and must not wait for a lock.
         let again = INTERRUPTED.swap(true, Ordering::Relaxed);
         if again || !LISTENING.load(Ordering::Relaxed) {
+            // A plug-in's program would go on alone.
+            process_tree::end_descendants();
             medial::remove_temporaries();
             std::process::exit(Exit::Interrupted as i32);
         }

@@ -26,7 +26,7 @@ bounds = [float(bound) for bound in arguments.bounds.split(",")]
 def rows(mesh, method, *levels):
     with tempfile.TemporaryDirectory() as folder:
         command = [arguments.medial, "compare", mesh, "--methods", method, "--counts-only", *levels]
-        command += ["--samples", "50000", "--timeout", "3000", "--quiet", "--out", folder]
+        command += ["--samples", "50000", "--timeout", "9000", "--budget", "9000", "--quiet", "--out", folder]
         subprocess.run(command, check=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         lines = (Path(folder) / "results.jsonl").read_text().splitlines()
     return [json.loads(line) for line in lines]

@@ -3,10 +3,11 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::command::{faulty, folder, processes_with, records, run_program, words};
+use crate::command::{MEDIAL, faulty, folder, processes_with, records, run_program, words};
 
 /// Runs `compare` of the faulty methods on a box, which must end in a code, and returns its records.
 #[track_caller]
@@ -183,7 +184,34 @@ fn only_the_tree_of_the_worker_ends_with_it() {
     let pid = fs::read_to_string(&pid).expect("a number").trim().to_owned();
     let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
     assert!(String::from_utf8_lossy(&line).contains("7777"), "the neighbour still runs");
-    assert!(std::process::Command::new("kill").arg(&pid).status().expect("kill runs").success());
+    assert!(Command::new("kill").arg(&pid).status().expect("kill runs").success());
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_program_ends_with_the_command_that_is_terminated() {
+    let at = folder();
+    let file = plugins(&at, &[("p-waits", "sleep 6543")]);
+    let line = [
+        "simplify",
+        "builtin:box:8",
+        "-m",
+        "p-waits",
+        "--spheres",
+        "20",
+        "--json",
+        "--plugins",
+        &file,
+    ];
+    let mut command = Command::new(MEDIAL);
+    let mut child = command.args(line).stdout(Stdio::null()).spawn().expect("it starts");
+    while processes_with("sleep 6543").is_empty() && child.try_wait().expect("state").is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let killed = Command::new("kill").arg(child.id().to_string()).status().expect("kill runs");
+    assert!(killed.success());
+    assert_eq!(child.wait().expect("it ends").code(), Some(130));
+    assert!(processes_with("sleep 6543").is_empty(), "the program goes on");
 }
 
 #[test]
