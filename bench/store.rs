@@ -116,24 +116,28 @@ impl Store {
         Ok(())
     }
 
-    /// The levels of an item that have to be run: levels without a record or whose medial mesh is gone, levels that were
+    /// The levels of an item that have to be run: levels without a record or whose medial mesh is missing, levels that were
     /// ended by a limit or skipped by a budget that is larger now, and failed or skipped ones if these are to be retried.
     pub fn missing(&self, item: &Item, retry_failed: bool) -> Vec<Target> {
         (item.levels.iter().zip(item.keys()))
             .filter(|(_, key)| {
                 let known = self.known.get(key);
                 known.is_none_or(|record| {
-                    self.lacks_mesh(record) || is_incomplete(record, item, retry_failed)
+                    self.lacks_mesh(record, item) || is_incomplete(record, item, retry_failed)
                 })
             })
             .map(|(&level, _)| level)
             .collect()
     }
 
-    /// Whether the medial mesh that a record names is gone. Some records name none.
-    fn lacks_mesh(&self, record: &Record) -> bool {
+    /// Whether a medial mesh that is to stay is gone, or was not kept when it was made.
+    fn lacks_mesh(&self, record: &Record, item: &Item) -> bool {
         let is_there = |name| artifact_path(&self.dir, name).is_some_and(|path| path.is_file());
-        record.artifact.as_deref().is_some_and(|name| !is_there(name))
+        match (&record.artifact, record.simplify.spheres) {
+            (Some(name), _) => !is_there(name),
+            (None, Some(n)) => item.keep.keeps(item, record.simplify.level, n),
+            (None, None) => false,
+        }
     }
 
     /// Adds records.

@@ -18,7 +18,7 @@ use crate::provenance::Provenance;
 use crate::rebuild::{Rebuilt, RunReport, write_study};
 use crate::store::{AXES, PAGE, RESULTS, Store};
 use crate::study::external::{GIVEN, Given};
-use crate::study::item::Item;
+use crate::study::item::{Item, Keep};
 use crate::study::registry::Registry;
 use crate::study::source::Source;
 use crate::study::{Study, StudyMethod, shard};
@@ -99,6 +99,10 @@ pub struct Arguments {
     /// End an item that needs more megabytes [default: three quarters of the machine's, shared by the jobs].
     #[arg(long, value_name = "MB")]
     memory: Option<u64>,
+    /// Results that stay on disk as `.ma`: `small` leaves out those of more than 1,000 spheres at levels of a method's
+    /// own [default: small].
+    #[arg(long, value_enum, value_name = "WHICH", hide_possible_values = true)]
+    keep: Option<Keep>,
     /// Certify each Hausdorff error by an interval of this width, a fraction of the diagonal.
     #[arg(long, value_name = "WIDTH")]
     certify: Option<f64>,
@@ -269,6 +273,7 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     study.budget = arguments.budget.unwrap_or(study.budget);
     study.jobs = arguments.jobs.unwrap_or(study.jobs);
     study.memory = arguments.memory.or(study.memory);
+    study.keep = arguments.keep.unwrap_or(study.keep);
     study.certify = arguments.certify.or(study.certify);
     study.threads = global.threads.or(study.threads);
     study.plugins.extend(global.plugins.iter().map(absolute));

@@ -312,7 +312,8 @@ pub fn record(
             Err(error) => record.simplify.warnings.push(format!("not measured: {error}")),
         }
     }
-    if let Some(axes) = axes {
+    let spheres = result.mesh.spheres.len();
+    if let Some(axes) = axes.filter(|_| item.keep.keeps(item, run.level, spheres)) {
         match save(result, &record, scene, axes) {
             Ok(artifact) => record.artifact = Some(artifact),
             Err(error) => record.simplify.warnings.push(format!("not saved: {error}")),

@@ -16,6 +16,7 @@ use medial_reports::Target;
 use serde::{Deserialize, Serialize};
 
 use crate::provenance::hex_digest;
+use crate::study::external::GIVEN;
 use crate::study::source::Source;
 
 /// One method on one input at some levels.
@@ -36,6 +37,9 @@ pub struct Item {
     pub threads: usize,
     /// What ends the item by force.
     pub limits: Limits,
+    /// Which of its results stay on disk. Not written where it is the usual choice, for workers of older builds.
+    #[serde(default, skip_serializing_if = "Keep::is_small")]
+    pub keep: Keep,
     /// The version of the method: a stale one must not lend its numbers.
     pub version: String,
     /// SHA-256 of the program that runs it, recorded only.
@@ -131,6 +135,38 @@ pub struct Limits {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub budget: Option<f64>,
 }
+
+/// Which results stay on disk as `.ma`. A record tells how to make the others again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Keep {
+    /// All results.
+    All,
+    /// Results at a count or a bound, results of other programs, and others of at most 1,000 spheres.
+    #[default]
+    Small,
+    /// No result, and so no pictures.
+    None,
+}
+
+impl Keep {
+    fn is_small(&self) -> bool {
+        *self == Self::Small
+    }
+
+    /// Whether a result of an item stays.
+    pub fn keeps(self, item: &Item, level: Target, spheres: usize) -> bool {
+        let is_asked = matches!(level, Target::Spheres(_) | Target::MaxError(_));
+        match self {
+            Self::All => true,
+            Self::Small => is_asked || item.method.id == GIVEN || spheres <= MOST_KEPT,
+            Self::None => false,
+        }
+    }
+}
+
+/// Spheres of the largest result that is kept at a level that nobody asked for.
+const MOST_KEPT: usize = 1_000;
 
 impl Item {
     /// The key of one level: equal for equal work. Limits and the number of repetitions are not in
@@ -243,6 +279,7 @@ mod tests {
             repeat: 1,
             threads: 2,
             limits: Limits { seconds: 300.0, bytes: 1 << 30, budget: None },
+            keep: Keep::Small,
             version: "34cd".into(),
             binary: "56ef".into(),
         }
@@ -256,11 +293,12 @@ mod tests {
             changed.key(Target::Spheres(100))
         };
         let plain = key(|_| ());
-        let same: [fn(&mut Item); 5] = [
+        let same: [fn(&mut Item); 6] = [
             // A rebuild that changed no method: the page, a verb.
             |i| i.binary = "56f0".into(),
             |i| i.limits.seconds = 1.0,
             |i| i.repeat = 5,
+            |i| i.keep = Keep::All,
             |i| i.levels.clear(),
             |i| i.scene.source = Source::File("elsewhere/bear.off".into()),
         ];

@@ -25,7 +25,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::provenance::{Provenance, hex_digest};
 use crate::study::external::Given;
-use crate::study::item::{Dual, Item, Limits, Measure, MethodSpec, Noise, SceneSpec};
+use crate::study::item::{Dual, Item, Keep, Limits, Measure, MethodSpec, Noise, SceneSpec};
 use crate::study::library::{Library, PublicError};
 use crate::study::registry::{Entry, INITIAL, Registry};
 use crate::study::source::{Input, InputError, Source, did_you_mean};
@@ -103,6 +103,8 @@ pub struct Study {
     /// Limit of memory in megabytes; three quarters of the machine's unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub memory: Option<u64>,
+    /// Which results stay on disk.
+    pub keep: Keep,
     /// Plug-in files.
     pub plugins: Vec<PathBuf>,
     /// Methods that start from what each filter leaves, beside those named.
@@ -174,6 +176,7 @@ impl Default for Study {
             budget: BUDGET,
             jobs: 1,
             memory: None,
+            keep: Keep::default(),
             plugins: vec![],
             after_filters: vec![],
             methods: vec![],
@@ -441,6 +444,7 @@ impl Study {
             repeat: self.repeat,
             threads: self.threads.unwrap_or_else(rayon::current_num_threads),
             limits: self.limits(here),
+            keep: self.keep,
             version,
             binary: here.binary_hash.clone(),
         }

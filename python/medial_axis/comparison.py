@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from . import _plugins
 from ._arguments import Progress, need, path_text
@@ -76,6 +76,7 @@ def compare(
     memory: float | None = None,
     jobs: int | None = None,
     threads: int | None = None,
+    keep: Literal["all", "small", "none"] | None = None,
     arguments: Sequence[str] = (),
     quiet: bool = False,
     progress: bool | Progress = False,
@@ -96,6 +97,7 @@ def compare(
         memory: Megabytes above which an item ends.
         jobs: Items at the same time; with several, seconds are in no table.
         threads: Threads; by default all processors.
+        keep: Results that stay on disk as `.ma`; `small`, the default, leaves out fine native levels.
         arguments: Further words of the command, such as `["--repeat", "3"]`.
         quiet: Print only reasons of missing results.
         progress: True shows one line that updates, on standard error or in a notebook; or a function, which is called with
@@ -132,7 +134,7 @@ def compare(
     for id, values in (params or {}).items():
         for key, value in values.items():
             words += ["--set", f"{id}.{key}={_word(value)}"]
-    limits = {"timeout": timeout, "budget": budget, "memory": memory, "jobs": jobs, "threads": threads}
+    limits = {"timeout": timeout, "budget": budget, "memory": memory, "jobs": jobs, "threads": threads, "keep": keep}
     for name, limit in limits.items():
         if limit is not None:
             words += [f"--{name}", str(limit)]

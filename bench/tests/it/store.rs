@@ -382,14 +382,36 @@ fn results_that_are_damaged_or_gone_are_run_again() {
     let mut lines = records(&out);
     lines[0]["evaluate"]["hausdorff"] = Value::Null;
     fs::remove_file(out.join(lines[1]["artifact"].as_str().expect("a name"))).expect("removed");
-    // A record without a medial mesh lacks none.
-    lines[2].as_object_mut().expect("a record").remove("artifact");
     let lines: Vec<String> = lines.iter().map(Value::to_string).collect();
     fs::write(&path, lines.join("\n") + "\n").expect("written");
     let more = ["--samples", "200", "--counts-only", "--out", text(&out)];
     let (_, stdout, stderr) = run(&[&["compare"], &words[..], &more].concat());
     assert!(stdout.contains("2 run now, 1 found") && stderr.contains("1; line 1"), "{stderr}");
     assert_eq!(run_and_found(&compare(&words, &out).1), (0, 3));
+}
+
+#[test]
+fn the_results_that_are_kept_can_be_chosen() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("out");
+    let words =
+        ["builtin:box:40", "--methods", "angle", "--spheres", "2000", "--levels", "angle=0"];
+    // Whether the results at the count and at the level, both of more than 1,000 spheres, are there.
+    let kept = |keep: &str, run: u64| {
+        assert_eq!(
+            run_and_found(&compare(&[&words[..], &["--keep", keep]].concat(), &out).1).0,
+            run
+        );
+        let last: std::collections::HashMap<String, bool> = (records(&out).iter())
+            .map(|r| (r["simplify"]["level"].to_string(), !r["artifact"].is_null()))
+            .collect();
+        [r#"{"spheres":2000}"#, r#"{"native":0.0}"#].map(|level| last[level])
+    };
+    assert_eq!(kept("none", 2), [false, false]);
+    // What is to stay and did not is made again.
+    assert_eq!(kept("small", 1), [true, false]);
+    assert_eq!(kept("small", 0), [true, false]);
+    assert_eq!(kept("all", 1), [true, true]);
 }
 
 #[test]
