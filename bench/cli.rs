@@ -46,6 +46,8 @@ pub enum Verb {
     Reconstruct(cmd::reconstruct::Arguments),
     /// Draw a surface, its medial meshes, or their reconstructions by error, as PNG.
     Render(cmd::render::Arguments),
+    /// Show medial meshes side by side in three dimensions, as one page.
+    View(cmd::view::Arguments),
     /// Repair a surface: fill its holes, keep its largest part.
     Repair(cmd::repair::Arguments),
     /// Convert between surface formats, or between medial mesh formats.
@@ -131,7 +133,7 @@ fn run_with(
 /// The verbs of each group, in the order of the help.
 const GROUPS: [(&str, &[&str]); 4] = [
     ("Compare methods", &["compare", "check", "methods"]),
-    ("One mesh", &["simplify", "axis", "evaluate", "render", "reconstruct"]),
+    ("One mesh", &["simplify", "axis", "evaluate", "render", "view", "reconstruct"]),
     ("Files", &["info", "repair", "convert", "datasets"]),
     ("Results of comparisons", &["report", "diff", "history"]),
 ];
@@ -178,6 +180,7 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Evaluate(arguments) => cmd::evaluate::run(&arguments, global),
         Verb::Reconstruct(arguments) => cmd::reconstruct::run(&arguments, global),
         Verb::Render(arguments) => cmd::render::run(&arguments, global),
+        Verb::View(arguments) => cmd::view::run(&arguments, global),
         Verb::Repair(arguments) => cmd::repair::run(&arguments, global),
         Verb::Convert(arguments) => cmd::convert::run(&arguments, global),
         Verb::Methods(arguments) => cmd::methods::run(&arguments, global, registry),

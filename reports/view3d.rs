@@ -22,7 +22,7 @@ use medial::complex::{MedialMesh, MedialUnion};
 use medial::surface::TriMesh;
 use serde_json::json;
 
-use crate::page::pack;
+use crate::page::{pack, page_of_view};
 use crate::render::{Camera, ColourMap, Errors, Scale};
 
 /// A surface is refined up to edges of this share of its diagonal, as long as it has at most so many
@@ -77,6 +77,15 @@ impl<'a> View3d<'a> {
 
     /// The file of the view with a name.
     pub fn script(&self, name: &str) -> String {
+        format!("{START}{}{MIDDLE}{}{END}", serde_json::Value::from(name), self.packed())
+    }
+
+    /// A page of this view alone: one file, which opens without a network.
+    pub fn page(&self, title: &str) -> String {
+        page_of_view(title, &self.packed())
+    }
+
+    fn packed(&self) -> String {
         let Self { camera, surface, errors, .. } = self;
         let (low, high) = surface.bounding_box().unwrap_or_default();
         let diagonal = low.distance(high);
@@ -111,7 +120,7 @@ impl<'a> View3d<'a> {
         for values in errors {
             bytes.extend(values.iter().map(|error| byte_of(error / end)));
         }
-        format!("{START}{}{MIDDLE}{}{END}", serde_json::Value::from(name), pack(&bytes))
+        pack(&bytes)
     }
 
     /// Everything but the errors.

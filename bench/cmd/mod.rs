@@ -15,3 +15,4 @@ pub mod render;
 pub mod repair;
 pub mod report;
 pub mod simplify;
+pub mod view;

@@ -80,6 +80,47 @@ fn embedded(value: &Value) -> String {
     printable(&value.to_string().replace('<', "\\u003c"))
 }
 
+/// The template with its parts.
+fn filled(title: &str, report: &Value, library: String, script: String) -> String {
+    // In their order: no value can be taken for a place of another.
+    let parts = [
+        ("{title}", escape_html(title)),
+        ("{style}", include_str!("page.css").to_owned()),
+        ("{title}", escape_html(title)),
+        ("{report}", embedded(report)),
+        ("{packed}", library),
+        ("{script}", script),
+    ];
+    let mut rest = include_str!("page.html");
+    let mut html = String::new();
+    for (place, text) in parts {
+        let (before, after) = rest.split_once(place).expect("the template has each place");
+        html.push_str(before);
+        html.push_str(&text);
+        rest = after; // never searched again: a value may look like a place
+    }
+    html + rest
+}
+
+fn libraries_3d() -> String {
+    packed("three", include_str!("vendor/three.module.min.js"))
+        + &packed("controls", include_str!("vendor/OrbitControls.js"))
+}
+
+/// The element of a 3D view with its packed text.
+fn view_element(name: &str, text: &str) -> String {
+    let name = escape_html(name);
+    format!("<script type=\"text/plain\" class=\"view\" id=\"view-{name}\">{text}</script>\n")
+}
+
+/// A page of one packed 3D view with all its results beside each other.
+pub(crate) fn page_of_view(title: &str, text: &str) -> String {
+    let library = libraries_3d() + &view_element("all", text);
+    let show = "document.querySelector(\"main\").append(viewOf({ name: \"all\", all: true }));\n";
+    let script = [include_str!("page.js"), include_str!("view3d.js"), show].concat();
+    filled(title, &json!({}), library, script)
+}
+
 impl Page<'_> {
     /// The page as HTML.
     pub(crate) fn to_html(&self) -> String {
@@ -93,15 +134,11 @@ impl Page<'_> {
         let views: Vec<&MeshView> =
             self.meshes.iter().filter_map(|mesh| mesh.view.as_ref()).collect();
         if !views.is_empty() {
-            library.push_str(&packed("three", include_str!("vendor/three.module.min.js")));
-            library.push_str(&packed("controls", include_str!("vendor/OrbitControls.js")));
+            library.push_str(&libraries_3d());
         }
         for view in views {
             let Some(text) = &view.text else { continue }; // read from its file when opened
-            let name = escape_html(&view.name);
-            library.push_str(&format!(
-                "<script type=\"text/plain\" class=\"view\" id=\"view-{name}\">{text}</script>\n"
-            ));
+            library.push_str(&view_element(&view.name, text));
         }
         let script = [
             include_str!("page.js"),
@@ -110,24 +147,7 @@ impl Page<'_> {
             include_str!("view3d.js"),
             "start();\n", // after all parts are defined
         ];
-        // The parts of the template in their order: no value can be taken for a place of another.
-        let parts = [
-            ("{title}", escape_html(title)),
-            ("{style}", include_str!("page.css").to_owned()),
-            ("{title}", escape_html(title)),
-            ("{report}", embedded(&self.report())),
-            ("{packed}", library),
-            ("{script}", script.concat()),
-        ];
-        let mut rest = include_str!("page.html");
-        let mut html = String::new();
-        for (place, text) in parts {
-            let (before, after) = rest.split_once(place).expect("the template has each place");
-            html.push_str(before);
-            html.push_str(&text);
-            rest = after; // never searched again: a value may look like a place
-        }
-        html + rest
+        filled(title, &self.report(), library, script.concat())
     }
 
     /// The large document: the records as columns, and the plots of each mesh.

@@ -51,6 +51,7 @@ const UNITS = "Lengths in % of the bounding-box diagonal of the input; seconds o
   "Arrows: which way is better. Bold: best for this mesh at this number of spheres, among results that reached it to " +
   "within 2 %. †: non-monotone, more than 5 % above the error of the same method with fewer spheres. results.csv holds every " +
   "recorded number.";
+const GLOSSARY = "https://github.com/medial-rs/medial/blob/main/METHODOLOGY.md#glossary";
 // Next to the page. The last two where there are means.
 const FILES = [
   ["results.jsonl", "the records, one JSON object on each line"],
@@ -141,9 +142,12 @@ const methodsOf = (methods) => make("dl", {}, ...methods.flatMap(({ id, title, s
 ]));
 
 // The methods without a result, and how to add them.
-const notRunOf = ({ methods, command }) => make("div", { class: "notrun" },
-  make("p", {}, make("strong", {}, "Not run: "), methods.map(({ id, home }) => home ? `${id} (${home.split(/[,;:.]/)[0].toLowerCase()})` : id).join(", "),
+const notRunOf = ({ methods, command }) => {
+  const end = methods.length > 3 ? /[,;:.]/ : /\./; // of a few methods also what they cost
+  const named = methods.map(({ id, home }) => home ? `${id} (${home[0].toLowerCase()}${home.slice(1).split(end)[0]})` : id);
+  return make("div", { class: "notrun" }, make("p", {}, make("strong", {}, "Not run: "), named.join(", "),
     ". This command adds the missing results to this page:"), code(command));
+};
 
 // A fold whose content is made when it is first opened, or printed.
 const late = (details, build) => {
@@ -233,7 +237,8 @@ const start = async () => {
   if (others.length) folds.push(late(fold("plots", "More plots"), () => [plotsOf(others)]));
   if (report.methods.length) folds.push(fold("methods", "Methods", methodsOf(report.methods)));
   if (report.not_run) folds.push(fold("not-run", "Methods that were not run", methodsOf(report.not_run.methods), code(report.not_run.command)));
-  folds.push(fold("definitions", "Definitions", listOf([...report.definitions, ...WORDS])));
+  folds.push(fold("definitions", "Definitions", listOf([...report.definitions, ...WORDS]),
+    make("p", {}, "Further words: ", make("a", { href: GLOSSARY }, "the glossary"), ".")));
   if (report.papers) {
     const about = "plots/ holds all plots as SVG, lettered in Helvetica, Arial or another sans-serif; tables/ holds all " +
       "tables as LaTeX for \\input. They need no package; booktabs gives finer rules, graphicx shrinks wide tables to the " +

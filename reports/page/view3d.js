@@ -7,6 +7,8 @@ const viewOf = (() => {
   const SIDES = [3, 24];
   const ALL_SIDES = 150000;
   const MANY_BALLS = 1000;
+  // Browsers keep few contexts: further results are in the lists.
+  const MOST_SIDES = 6;
 
   // The text of a view, from the page or from its file.
   const arriving = new Map();
@@ -262,7 +264,8 @@ const viewOf = (() => {
         return list;
       };
       this.of = select("result", view.results.map((result, k) => [k, result.label]), chosen[0]);
-      this.kind = select("quantity", KINDS, chosen[1]);
+      // Without a surface there are the medial meshes alone.
+      this.kind = select("quantity", view.indices.length ? KINDS : KINDS.slice(0, 2), chosen[1]);
       this.canvas = make("canvas", { tabindex: 0 });
       this.caption = make("figcaption");
       this.figure = make("figure", { class: "side" }, make("div", { class: "bar" }, this.of, this.kind), this.canvas, this.caption);
@@ -382,7 +385,9 @@ const viewOf = (() => {
         });
       };
       const last = String(view.results.length - 1);
-      const firsts = view.results.length > 1 ? [["0", "axis"], [last, "axis"]] : [["0", "axis"], ["0", "errors"]];
+      const second = view.indices.length ? "errors" : "union";
+      const all = view.results.slice(0, MOST_SIDES).map((_, k) => [String(k), "axis"]);
+      const firsts = view.results.length < 2 ? [["0", "axis"], ["0", second]] : source.all ? all : [["0", "axis"], [last, "axis"]];
       for (const chosen of firsts) sides.push(new Side(T, view, eye, chosen, changed));
       const panel = make("div", { class: "sides" }, ...sides.map((side) => side.figure));
       place.append(panel);
@@ -417,6 +422,10 @@ const viewOf = (() => {
       for (const old of place.querySelectorAll(".note")) old.remove();
       open(place, button, source);
     });
+    if (source.all) {
+      button.hidden = true;
+      open(place, button, source);
+    }
     return place;
   };
 })();

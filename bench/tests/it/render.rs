@@ -91,3 +91,23 @@ fn wrong_words_are_named_and_nothing_is_written() {
         refused(&["render", "builtin:sphere:8", "-o", &at(name)], 1, part);
     }
 }
+
+#[test]
+fn a_view_is_one_page_that_needs_nothing_else() {
+    let at = folder();
+    let (mesh, axis, page) = ("builtin:torus", at("torus.ma"), at("view.html"));
+    done(&["simplify", mesh, "-m", "qmat", "--spheres", "20", "-o", &axis]);
+    let mut sizes = vec![];
+    for words in [&["--mesh", mesh][..], &[]] {
+        let (code, object) = json(&[&["view", &axis, &axis, "-o", &page], words].concat());
+        assert_eq!((code, &object["medial_meshes"]), (0, &2.into()), "{object}");
+        let text = fs::read_to_string(&page).expect("a page");
+        // Three.js names the site of a shader's source in a comment, packed.
+        assert!(!text.contains(" src=") && !text.contains("href="), "it loads something");
+        sizes.push(text.len());
+    }
+    assert!(sizes[1] < sizes[0] && sizes[0] < 3_000_000, "{sizes:?}");
+    fs::write(at("empty.ma"), "0 0 0\n").expect("written");
+    refused(&["view", &at("empty.ma"), "-o", &page], 1, "no sphere");
+    refused(&["view", &axis, "-o", &at("view.png")], 1, "not one of .html");
+}
