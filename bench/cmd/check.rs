@@ -20,18 +20,18 @@ use crate::study::registry::{Entry, Registry};
 /// Arguments of `check`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Methods [default: all but those on request, those of `--plugins` too].
+    /// Methods [default: all, with plug-ins, but those that run on request].
     ids: Vec<String>,
-    /// Run these cases alone; can be given several times [default: all].
+    /// Run this case; repeatable [default: all].
     #[arg(long = "case", value_name = "NAME")]
     cases: Vec<String>,
-    /// Set a parameter of the methods; can be given several times.
+    /// Set a parameter of the methods; repeatable.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
     set: Vec<(String, String)>,
-    /// End a case after so many seconds [default: 300].
+    /// Stop a case after SECONDS [default: 300].
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     timeout: Option<f64>,
-    /// End a case that needs more megabytes [default: three quarters of the machine's].
+    /// Stop a case that uses more than MB megabytes [default: 3/4 of the machine's memory].
     #[arg(long, value_name = "MB")]
     memory: Option<u64>,
 }

@@ -26,41 +26,39 @@ use crate::study::{Study, StudyMethod, shard};
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface files (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME` [default: three built-in shapes,
-    /// `bracket`, `torus` and `blob`; `--dataset builtin` runs all].
+    /// Surface files (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`
+    /// [default: `builtin:bracket`, `builtin:torus` and `builtin:blob`].
     meshes: Vec<MeshArgument>,
-    /// A set of meshes beside those named: `builtin`, `public`, `defective`, `small`, `papers`, a package as in
-    /// `deb:libcgal-demo`, or the name of one mesh; can be given several times.
+    /// Add a set of meshes: `builtin`, `public`, `defective`, `small`, `papers`, a package such as
+    /// `deb:libcgal-demo`, or the name of one mesh; repeatable.
     #[arg(long, value_name = "SET")]
     dataset: Vec<String>,
-    /// Take meshes, methods, levels and limits from a TOML file; what else is given wins over it.
+    /// Read meshes, methods, levels and limits from a TOML file; the command line takes precedence.
     #[arg(long, value_name = "FILE")]
     study: Option<PathBuf>,
-    /// Methods, separated by commas, each with parameters of its own if wanted: `qmat,qmat:k=0`
+    /// Run these methods, separated by commas, with parameters as in `qmat,qmat:k=0`
     /// [default: all but those that run on request].
     #[arg(long, value_name = "ID[:KEY=VALUE]", value_delimiter = ',')]
     methods: Vec<String>,
-    /// Sphere counts, separated by commas [default: 500,200,100].
+    /// Simplify to these sphere counts, separated by commas [default: 500,200,100].
     #[arg(long, value_name = "COUNTS", value_delimiter = ',')]
     spheres: Vec<usize>,
-    /// Levels of a method's own beside the counts, in place of its default sweep; can be given
-    /// several times.
+    /// Run method ID at these native levels instead of its default sweep; repeatable.
     #[arg(long, value_name = "ID=X,Y")]
     levels: Vec<String>,
-    /// Counts alone: no levels of the methods' own but those given, no row of the initial medial
-    /// mesh.
+    /// Skip the default sweeps of native levels and the initial medial mesh.
     #[arg(long)]
     counts_only: bool,
-    /// Search the fewest spheres within each of these Hausdorff errors, fractions of the diagonal.
+    /// Search the fewest spheres within each of these Hausdorff errors, as fractions of the diagonal.
     #[arg(long, value_name = "E,F", value_delimiter = ',')]
     max_error: Vec<f64>,
-    /// Also run these methods from what each filter leaves: `qmat` adds `angle+qmat` and so on.
+    /// Also run these methods on the output of each filter: `qmat` adds `angle+qmat` and so on.
     #[arg(long, value_name = "IDS", value_delimiter = ',')]
     after_filters: Vec<String>,
     /// Also run each method at its published level.
     #[arg(long)]
     published: bool,
-    /// Set a parameter of one method; can be given several times.
+    /// Set a parameter of one method; repeatable.
     #[arg(long = "set", value_name = "METHOD.KEY=VALUE")]
     set: Vec<String>,
     /// Add medial meshes computed elsewhere as results of method NAME: a file, `NAME@MESH=FILE` with several
@@ -68,42 +66,41 @@ pub struct Arguments {
     /// `--spheres`.
     #[arg(long, value_name = "NAME=PATH")]
     given: Vec<String>,
-    /// Time each item so many times, the methods in turn; the median is reported, all are kept
-    /// [default: 1].
+    /// Time each item N times, alternating between methods, and report the median [default: 1].
     #[arg(long, value_name = "N")]
     repeat: Option<usize>,
-    /// Run share I of N of the items, into a folder of its own; `medial report` merges the folders.
+    /// Run share I of N of the items; merge the folders by `medial report`.
     #[arg(long, value_name = "I/N")]
     shard: Option<String>,
-    /// Folder of the results. What is there already is not run again.
+    /// Write results to this folder, and skip items that it already has.
     #[arg(long, value_name = "DIR", default_value = "medial-report")]
     out: PathBuf,
     /// Remove the results in the folder first.
     #[arg(long)]
     fresh: bool,
-    /// Run again what failed.
+    /// Run failed items again.
     #[arg(long)]
     retry_failed: bool,
-    /// End an item after so many seconds [default: 300].
+    /// Stop an item after SECONDS [default: 300].
     #[arg(long, value_name = "SECONDS")]
     timeout: Option<f64>,
-    /// Seconds after which a method begins no further level on a mesh; the others are `skipped` [default: 60].
+    /// Start no further level of a method on a mesh after SECONDS, and mark the rest `skipped` [default: 60].
     #[arg(long, value_name = "SECONDS")]
     budget: Option<f64>,
-    /// Run N items at the same time; their seconds are in no table [default: 1].
+    /// Run N items at the same time; tables then omit seconds [default: 1].
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
-    /// Exit with 3 when any result is not as requested, not only after failures.
+    /// Exit with code 3 when any result is not as requested, not only after failures.
     #[arg(long)]
     strict: bool,
-    /// End an item that needs more megabytes [default: three quarters of the machine's, shared by the jobs].
+    /// Stop an item that uses more than MB megabytes [default: 3/4 of the machine's memory, divided by the jobs].
     #[arg(long, value_name = "MB")]
     memory: Option<u64>,
-    /// Results that stay on disk as `.ma`: `small` leaves out those of more than 1,000 spheres at levels of a method's
-    /// own [default: small].
+    /// Write results as `.ma`: `all`, `none`, or `small`, which omits native levels of more than
+    /// 1,000 spheres [default: small].
     #[arg(long, value_enum, value_name = "WHICH", hide_possible_values = true)]
     keep: Option<Keep>,
-    /// Certify each Hausdorff error by an interval of this width, a fraction of the diagonal.
+    /// Certify each Hausdorff error by an interval of this width, as a fraction of the diagonal.
     #[arg(long, value_name = "WIDTH")]
     certify: Option<f64>,
     #[command(flatten)]

@@ -22,12 +22,12 @@ pub struct Arguments {
     /// Surface (OFF, OBJ, PLY, STL) or medial mesh (.ma and its dialects, .ply or .obj with radii).
     from: PathBuf,
     /// Surface (OFF, OBJ, PLY) or medial mesh (.ma, .ply, .obj, .vtp for ParaView, .glb for Blender and browsers).
-    /// `.glb` has single precision, and its y is up: z here, as Blender shows it.
+    /// `.glb` has single precision, and its upward axis y is z of the input.
     to: PathBuf,
-    /// Take the lines of a medial mesh as they are where its header announces another number of them.
+    /// Read all lines of a medial mesh whose header states a different number.
     #[arg(long)]
     lenient: bool,
-    /// Which medial mesh is meant of a file to which several were appended, from 1.
+    /// Read the K-th medial mesh of a file that holds several, counted from 1.
     #[arg(long, value_name = "K")]
     block: Option<usize>,
     #[command(flatten)]
@@ -83,13 +83,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
 /// Options of formats for viewers.
 #[derive(Debug, Args)]
 struct LookArguments {
-    /// What `.glb` is coloured by, and an array beside the radii in `.vtp` [default: radius].
+    /// Colour `.glb` by this, and add it to `.vtp` as an array [default: radius].
     #[arg(long, alias = "colour", value_enum)]
     color: Option<Colour>,
-    /// The surface (a file, or `builtin:ID[:RESOLUTION]`) that errors are measured to, in the units of the medial mesh.
+    /// Measure errors to this surface (a file, or `builtin:ID[:RESOLUTION]`) in the units of the medial mesh.
     #[arg(long, value_name = "SURFACE")]
     mesh: Option<MeshArgument>,
-    /// The spheres as round bodies as well, in `.glb`: one mesh of 80 triangles and 2.3 kB a sphere.
+    /// Add the spheres to `.glb` as round bodies, each of 80 triangles and 2.3 kB.
     #[arg(long)]
     spheres: bool,
 }
@@ -99,9 +99,9 @@ struct LookArguments {
 enum Colour {
     /// The radii of the spheres.
     Radius,
-    /// Of each sphere the least stability ratio of its edges.
+    /// The least stability ratio of the edges of each sphere.
     Stability,
-    /// By how much each sphere reaches out of the surface of `--mesh` (red) or falls short of it (blue).
+    /// The distance by which each sphere exceeds the surface (red) or falls short of it (blue).
     Error,
 }
 

@@ -25,7 +25,7 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// List the built-in shapes, and the meshes that are known by name with their state.
+    /// List the built-in shapes and the published meshes with their state.
     List,
     /// Write a built-in shape as a surface file.
     Make(Make),
@@ -37,16 +37,16 @@ enum Action {
 struct Make {
     /// Id of the shape.
     id: String,
-    /// The file (OFF, OBJ, PLY).
+    /// Write the surface to this file (OFF, OBJ, PLY).
     #[arg(short, long)]
     output: PathBuf,
-    /// Resolution, in the shape's own meaning [default: that of `compare`].
+    /// Set the resolution; its meaning depends on the shape [default: as in `compare`].
     #[arg(long)]
     resolution: Option<u32>,
     /// Displace each vertex uniformly in a ball of this radius, a fraction of the diagonal from 0 to 1.
     #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
     noise: f64,
-    /// Seed of the noise.
+    /// Set the seed of the noise.
     #[arg(long, default_value_t = 0)]
     seed: u64,
 }
@@ -88,14 +88,14 @@ const SCRIPT: &str = include_str!("../../scripts/fetch_meshes.py");
 
 #[derive(Debug, Args)]
 struct Fetch {
-    /// Sets (`public`, `defective`, `small`), packages as in `deb:libcgal-demo`, or names of meshes.
+    /// Sets (`public`, `defective`, `small`), packages such as `deb:libcgal-demo`, or names of meshes.
     #[arg(default_value = "public")]
     wanted: Vec<String>,
-    /// Take meshes from this archive (.deb, .whl, .zip, .tgz, .tar.gz, .tar.xz) or surface file and fetch nothing;
+    /// Extract meshes from this archive (.deb, .whl, .zip, .tgz, .tar.gz, .tar.xz) or surface file and fetch nothing;
     /// repeatable.
     #[arg(long, value_name = "ARCHIVE")]
     from: Vec<PathBuf>,
-    /// End a client (apt-get, pip, npm) after SECONDS.
+    /// Stop a client (apt-get, pip, npm) after SECONDS.
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 600.0)]
     timeout: f64,
 }

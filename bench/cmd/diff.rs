@@ -26,29 +26,29 @@ use crate::study::registry::Registry;
 /// Arguments of `diff`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The older results: a folder, or its `results.jsonl`; with `--run` the older program.
+    /// Older results (a folder or its `results.jsonl`), or the older program with `--run`.
     old: PathBuf,
-    /// The newer ones.
+    /// Newer results, or the newer program.
     new: PathBuf,
-    /// Take two builds of this program, and run the study with both alternately.
+    /// Run a study with two builds of this program alternately.
     #[arg(long, requires = "study")]
     run: bool,
-    /// The study that both run.
+    /// Read the study from this TOML file.
     #[arg(long, value_name = "FILE", requires = "run")]
     study: Option<PathBuf>,
-    /// Folder of both results, and of the difference. What is there already is not run again.
+    /// Write both results and the difference to this folder, and skip items that it already has.
     #[arg(long, value_name = "DIR", default_value = "medial-diff", requires = "run")]
     out: PathBuf,
-    /// Repetitions of each item.
+    /// Time each item N times.
     #[arg(long, value_name = "N", default_value_t = 10, requires = "run")]
     repeat: usize,
-    /// From which on a larger error is a regression, as a fraction.
+    /// Report an increase of an error by more than this fraction.
     #[arg(long, value_name = "FRACTION", value_parser = share, default_value_t = DiffOptions::default().error)]
     error: f64,
-    /// From which on more memory is a regression, as a fraction.
+    /// Report an increase of memory by more than this fraction.
     #[arg(long, value_name = "FRACTION", value_parser = share, default_value_t = DiffOptions::default().memory)]
     memory: f64,
-    /// From which on more CPU seconds of a method are a regression, as a fraction.
+    /// Report an increase of a method's CPU seconds by more than this fraction.
     #[arg(long, value_name = "FRACTION", value_parser = share, default_value_t = DiffOptions::default().seconds)]
     seconds: f64,
 }

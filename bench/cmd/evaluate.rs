@@ -22,16 +22,16 @@ use crate::study::external::{AxisOptions, read_axis};
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
-    /// Medial meshes (.ma and its dialects, or .ply or .obj with radii), in the units of the surface
-    /// unless `--fit` finds others. Several files give one table.
+    /// Medial meshes (.ma and its dialects, or .ply or .obj with radii) in the units of the surface.
+    /// Several files give one table.
     #[arg(required = true, value_name = "X.ma")]
     axes: Vec<PathBuf>,
     #[command(flatten)]
     fitting: AxisOptions,
-    /// Seed of the samples.
+    /// Set the seed of the samples.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Enclose the Hausdorff distance in an interval of at most this width, as a fraction of the
+    /// Certify the Hausdorff distance by an interval of at most this width, as a fraction of the
     /// diagonal.
     #[arg(long, value_name = "TOL")]
     certify: Option<f64>,

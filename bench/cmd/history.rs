@@ -18,19 +18,19 @@ use crate::store::RESULTS;
 pub struct Arguments {
     /// Folder of the history: one file for each run.
     folder: PathBuf,
-    /// Add the results of `medial compare` in STORE as a run first.
+    /// Add the results of `medial compare` in STORE as a run.
     #[arg(long, value_name = "STORE", requires_all = ["commit", "date"])]
     add: Option<PathBuf>,
-    /// Hash of the commit that was measured.
+    /// Set the hash of the measured commit.
     #[arg(long, value_name = "HASH", requires = "add")]
     commit: Option<String>,
-    /// Date of the commit, for example from `git show -s --format=%cI`.
+    /// Set the date of the commit, as printed by `git show -s --format=%cI`.
     #[arg(long, value_name = "DATE", requires = "add")]
     date: Option<String>,
-    /// Write a page, too.
+    /// Write a page.
     #[arg(long, short, value_name = "PAGE.html")]
     output: Option<PathBuf>,
-    /// Least change of seconds or memory that counts, as a share.
+    /// Ignore changes of seconds or memory below this fraction.
     #[arg(long, value_name = "SHARE", value_parser = positive, default_value_t = 0.05)]
     least_step: f64,
 }

@@ -25,22 +25,22 @@ use crate::study::external::{AxisOptions, FitBy, RadiiFrom, percent, read_axis};
 /// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Medial mesh (.ma, or .ply with radii). The power crust can do without one: it then takes all
-    /// inner poles of the mesh.
+    /// Medial mesh (.ma, or .ply with radii) [default for the power crust: all inner poles of the
+    /// surface].
     axis: Option<PathBuf>,
-    /// The surface (.ply, .off, .obj), in the units of the medial mesh.
+    /// Write the surface (.ply, .off, .obj) in the units of the medial mesh.
     #[arg(short, long)]
     output: PathBuf,
-    /// What is made of the spheres.
+    /// Compute this kind of surface.
     #[arg(long, value_enum, default_value_t = Method::Union)]
     method: Method,
-    /// Surface that the medial mesh is of: a file, or `builtin:ID[:RESOLUTION]`. The power crust
-    /// takes its outer poles; either result is measured against it.
+    /// Measure the result against the original surface, a file or `builtin:ID[:RESOLUTION]`. The
+    /// power crust requires it for its outer poles.
     #[arg(long, value_name = "MESH")]
     mesh: Option<MeshArgument>,
-    /// How far the surface may be from the boundary of the union, as a fraction of the diagonal of
-    /// the mesh, or of the box around the spheres without one [default: the coarsest of 0.04, 0.02 and
-    /// 0.01 that shows the union's topology, with all faces within 0.005].
+    /// Limit the distance to the boundary of the union, as a fraction of the diagonal of the original
+    /// surface, or else of the spheres' box [default: the coarsest of 0.04, 0.02 and 0.01 with the
+    /// union's topology, with all faces within 0.005].
     #[arg(long, value_name = "FRACTION", value_parser = fraction)]
     tolerance: Option<f64>,
     #[command(flatten)]

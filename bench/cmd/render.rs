@@ -27,39 +27,39 @@ use crate::study::external::{AxisOptions, read_axis};
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
-    /// Medial meshes of it (.ma or .ply with radii). Several give a strip: a panel for each, from the same camera.
+    /// Medial meshes (.ma or .ply with radii). Several give a strip with one panel for each.
     axes: Vec<PathBuf>,
-    /// The picture (.png).
+    /// Write the picture (.png).
     #[arg(short, long)]
     output: PathBuf,
-    /// What is drawn [default: `axis`, `surface` without a medial mesh]. `error` with several medial meshes: both the
-    /// medial meshes and, below, their reconstructions.
+    /// Draw this [default: `axis`, or `surface` without a medial mesh].
     #[arg(long, value_enum)]
     show: Option<Show>,
-    /// What a medial mesh is coloured by.
+    /// Colour medial meshes by this.
     #[arg(long, alias = "colour", value_enum, default_value_t = Colour::Radius)]
     color: Colour,
-    /// `front`, `back`, `left`, `right`, `top`, `bottom`, `iso`, AZIMUTH,ELEVATION in degrees, or X,Y,Z from the shape to
-    /// the eye [default: the direction that shows most of the shape].
+    /// Look from `front`, `back`, `left`, `right`, `top`, `bottom`, `iso`, AZIMUTH,ELEVATION in degrees, or direction
+    /// X,Y,Z [default: the direction that shows most of the shape].
     #[arg(long, value_name = "VIEW", allow_hyphen_values = true, value_parser = view)]
     camera: Option<View>,
-    /// Upward direction: `x`, `y`, `z`, `-x`, `-y`, `-z` or X,Y,Z [default: `y`, `z` for shapes that are flat along `y`].
+    /// Set the upward direction: `x`, `y`, `z`, `-x`, `-y`, `-z` or X,Y,Z [default: `y`, or `z` for shapes that are flat
+    /// along `y`].
     #[arg(long, value_name = "DIRECTION", allow_hyphen_values = true, value_parser = upwards)]
     up: Option<Vec3>,
-    /// 1: the shape fills the picture; 2: twice as large.
+    /// Enlarge the shape by this factor; 1 fills the picture.
     #[arg(long, default_value_t = 1.0)]
     zoom: f64,
-    /// Pixels of the picture, of a strip's panel.
+    /// Set the pixels of each panel.
     #[arg(long, value_name = "WxH", default_value = "800x600", value_parser = size)]
     size: [usize; 2],
-    /// `white`, `black`, `transparent` or `#rrggbb`.
+    /// Set the background: `white`, `black`, `transparent` or `#rrggbb`.
     #[arg(long, value_name = "COLOUR", default_value = "white", value_parser = background)]
     background: Background,
-    /// The end of the scale of errors, as a fraction of the diagonal; larger errors have its last colour [default: 90 %
-    /// of the errors are within it, of several medial meshes by the better half].
+    /// End the colour scale of errors here, as a fraction of the diagonal [default: covers 90 % of the errors, of several
+    /// medial meshes those of the better half].
     #[arg(long, value_name = "FRACTION", value_parser = fraction)]
     max_error: Option<f64>,
-    /// Largest distance of a reconstruction from the boundary of the union, as a fraction of the diagonal.
+    /// Limit the distance of a reconstruction to the boundary of the union, as a fraction of the diagonal.
     #[arg(long, value_name = "FRACTION", default_value_t = 0.01, value_parser = fraction)]
     tolerance: f64,
     #[command(flatten)]
@@ -75,8 +75,8 @@ enum Show {
     Axis,
     /// The boundary of the union of the spheres, cones and slabs.
     Reconstruction,
-    /// The same, coloured by its distance to the surface: red outside, blue inside. Missing parts of the surface are
-    /// glass.
+    /// The reconstruction coloured by its distance to the surface: red outside, blue inside, glass where parts are
+    /// missing. Several medial meshes are drawn above their reconstructions.
     Error,
 }
 

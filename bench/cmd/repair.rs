@@ -16,16 +16,16 @@ use crate::output::print_result;
 pub struct Arguments {
     /// Surface (OFF, OBJ, PLY, STL).
     input: PathBuf,
-    /// The repaired surface (OFF, OBJ, PLY).
+    /// Write the repaired surface (OFF, OBJ, PLY).
     #[arg(short, long)]
     output: PathBuf,
     /// Close holes of up to 500 edges by triangles between their vertices.
     #[arg(long)]
     fill_holes: bool,
-    /// Draw parts back from vertices in which they touch, by a thousandth of their faces there.
+    /// Separate parts that touch in a vertex, by a thousandth of the size of their faces.
     #[arg(long)]
     separate: bool,
-    /// Which parts to keep.
+    /// Keep these parts.
     #[arg(long, value_enum, default_value_t = Keep::All)]
     components: Keep,
 }
@@ -33,9 +33,9 @@ pub struct Arguments {
 /// Which parts to keep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Keep {
-    /// The one of the largest area.
+    /// The part with the largest area.
     Largest,
-    /// All of them.
+    /// All parts.
     All,
 }
 

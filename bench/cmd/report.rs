@@ -25,7 +25,7 @@ pub struct Arguments {
     /// Stores: folders with `results.jsonl`.
     #[arg(required = true, value_name = "DIR")]
     dirs: Vec<PathBuf>,
-    /// Store that the others are merged into; needed for several.
+    /// Merge the stores into this folder; required for several stores.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }

@@ -35,22 +35,22 @@ use crate::study::source::Input;
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
-    /// Id of the method; `medial methods` lists them.
+    /// Run the method with this id; list the ids by `medial methods`.
     #[arg(long, short, value_name = "ID")]
     method: String,
-    /// Number of spheres.
+    /// Simplify to N spheres.
     #[arg(long, value_name = "N", conflicts_with_all = ["level", "max_error"])]
     spheres: Option<usize>,
-    /// The method's own level, in its own unit.
+    /// Simplify to native level X, in the unit of the method.
     #[arg(long, value_name = "X", conflicts_with = "max_error", allow_negative_numbers = true)]
     level: Option<f64>,
-    /// As few spheres as keep the symmetric Hausdorff error within this fraction of the diagonal.
+    /// Search the fewest spheres with a symmetric Hausdorff error of at most E, a fraction of the diagonal.
     #[arg(long, value_name = "E", value_parser = error_bound)]
     max_error: Option<f64>,
-    /// Hold that bound by a certificate, not by samples alone.
+    /// Prove the error bound by a certificate instead of samples.
     #[arg(long, requires = "max_error")]
     certify: bool,
-    /// Set a parameter of the method; can be given several times.
+    /// Set a parameter of the method; repeatable.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
     set: Vec<(String, String)>,
     /// Start from this medial mesh instead of the Voronoi one.
@@ -287,17 +287,16 @@ fn error_bound(text: &str) -> Result<f64, String> {
 /// Files to write.
 #[derive(Debug, Args)]
 struct Outputs {
-    /// The result (.ma, .ply, .obj, .vtp, .glb), in the units of the surface.
+    /// Write the result (.ma, .ply, .obj, .vtp, .glb) in the units of the surface.
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Write the voxels with their distance and flux (.csv), for methods on a lattice.
     #[arg(long, value_name = "FILE")]
     voxels: Option<PathBuf>,
-    /// Write the power crust of the poles that are left (.ply, .off, .obj), for methods that prune
-    /// by parts.
+    /// Write the power crust of the remaining poles (.ply, .off, .obj), for methods that prune by parts.
     #[arg(long, value_name = "FILE")]
     power_crust: Option<PathBuf>,
-    /// Outer poles that this power crust takes.
+    /// Build the power crust from these outer poles.
     #[arg(long, value_enum, default_value_t = Outer::All, requires = "power_crust")]
     outer_poles: Outer,
 }
@@ -305,9 +304,9 @@ struct Outputs {
 /// Outer poles of a power crust.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Outer {
-    /// Those of all samples.
+    /// The outer poles of all samples.
     All,
-    /// Not those of removed features: sharper where the shape has corners.
+    /// Without the outer poles of removed features: sharper where the shape has corners.
     Remaining,
 }
 

@@ -21,13 +21,13 @@ pub struct Arguments {
     /// Medial meshes in the same units.
     #[arg(required = true, value_name = "X.ma")]
     axes: Vec<PathBuf>,
-    /// Their surface: it is drawn as glass and coloured by the error of each result.
+    /// Draw this surface as glass, coloured by the error of each result.
     #[arg(long, value_name = "MESH")]
     mesh: Option<MeshArgument>,
-    /// The page: one file, which opens without a network.
+    /// Write the page, one file that opens offline.
     #[arg(short, long, value_name = "FILE.html")]
     output: PathBuf,
-    /// Show it in the browser.
+    /// Open the page in the browser.
     #[arg(long)]
     open: bool,
 }

@@ -392,17 +392,16 @@ const ON_SURFACE: f64 = 1e-9;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Args)]
 #[serde(default, deny_unknown_fields)]
 pub struct AxisOptions {
-    /// Take the lines of a medial mesh as they are where its header announces another number of them.
+    /// Read all lines of a medial mesh whose header states a different number.
     #[arg(long)]
     pub lenient: bool,
-    /// Which medial mesh is meant of a file to which several were appended, from 1.
+    /// Read the K-th medial mesh of a file that holds several, counted from 1.
     #[arg(long, value_name = "K")]
     pub block: Option<usize>,
-    /// Where radii come from: `surface` takes the distance of each centre to the surface, for files without radii
-    /// or with other numbers in their place.
+    /// Read radii from the file, or compute them where it has none or other numbers instead.
     #[arg(long, value_enum, default_value_t)]
     pub radii: RadiiFrom,
-    /// The units of the medial mesh: those of the surface, or whatever scale and shift fit it best, which are said.
+    /// Convert the units of the medial mesh to those of the surface, and print the scale and shift.
     #[arg(long, value_enum, default_value_t)]
     pub fit: FitBy,
 }
@@ -425,7 +424,7 @@ pub enum RadiiFrom {
     /// From the file.
     #[default]
     File,
-    /// From the surface.
+    /// The distance of each centre to the surface.
     Surface,
 }
 
@@ -436,9 +435,9 @@ pub enum FitBy {
     /// The file is in the units of the surface.
     #[default]
     None,
-    /// By the uniform scale and the shift under which spheres and surface fit.
+    /// Apply the uniform scale and the shift that fit the spheres to the surface.
     Similarity,
-    /// The same, if the file does not fit as it is and does so then.
+    /// As `similarity`, for files that fit only after scaling.
     Auto,
 }
 

@@ -20,6 +20,28 @@ fn help_names_every_verb() {
 }
 
 #[test]
+fn every_help_ends_with_examples_that_parse() {
+    let command = medial_bench::cli::command();
+    let verbs = command.get_subcommands().filter(|verb| !verb.is_hide_set());
+    let verbs: Vec<&str> = verbs.map(clap::Command::get_name).collect();
+    assert!(verbs.len() > 15, "{verbs:?}");
+    for verb in verbs.into_iter().map(Some).chain([None]) {
+        let words: Vec<&str> = verb.into_iter().chain(["--help"]).collect();
+        let help = done(&words);
+        let (_, examples) = help.split_once("\nExamples:\n").expect("a heading of examples");
+        let examples: Vec<&str> = examples.lines().map_while(|l| l.strip_prefix("  ")).collect();
+        assert!((2..=3).contains(&examples.len()), "{verb:?}: {examples:?}");
+        let shown =
+            verb.is_none_or(|verb| examples.iter().any(|e| e.split(' ').nth(1) == Some(verb)));
+        assert!(shown, "no example runs {verb:?}: {examples:?}");
+        for example in examples {
+            let parsed = command.clone().try_get_matches_from(example.split(' '));
+            parsed.unwrap_or_else(|error| panic!("{example}: {error}"));
+        }
+    }
+}
+
+#[test]
 fn methods_and_their_parameters() {
     insta::assert_snapshot!("methods", done(&["methods"]));
     for id in ["qmat", "pmat", "hem", "angle"] {
