@@ -80,8 +80,7 @@ pub enum Verb {
     },
 }
 
-/// The command with these methods: parses the command line, runs the verb, and turns the result
-/// into an exit code.
+/// The command with these methods: parses the command line, runs the verb, and turns the result into an exit code.
 pub fn main_with(methods: Vec<Registered>) -> ExitCode {
     run_with(methods, None, std::env::args_os()).into()
 }
@@ -89,7 +88,7 @@ pub fn main_with(methods: Vec<Registered>) -> ExitCode {
 /// [`main_with`] inside another program, which loads plug-ins written in its language.
 ///
 /// # Panics
-/// When called twice: the command belongs to its process.
+/// When called twice in a process.
 pub fn main_hosted(methods: Vec<Registered>, host: Host, loader: Box<dyn ScriptLoader>) -> Exit {
     let words = std::iter::once(OsString::from("medial")).chain(host.words.iter().cloned());
     let words: Vec<OsString> = words.collect();
@@ -139,122 +138,77 @@ const GROUPS: [(&str, &[&str]); 4] = [
 ];
 
 /// Examples at the end of the help: of the command for all verbs, then of each verb.
-const EXAMPLES: [(&str, &[&str]); 17] = [
-    (
-        "medial",
-        &[
-            "medial compare",
-            "medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma",
-            "medial evaluate builtin:blob blob.ma",
-        ],
-    ),
-    (
-        "compare",
-        &[
-            "medial compare",
-            "medial compare builtin:torus --methods qmat,hem --spheres 200,50",
-            "medial compare --dataset builtin --max-error 0.02 --out within-2-percent",
-        ],
-    ),
-    ("check", &["medial check qmat", "medial check qmat --set k=0 --timeout 60"]),
-    ("methods", &["medial methods", "medial methods qmat", "medial methods --json"]),
-    (
-        "simplify",
-        &[
-            "medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma",
-            "medial simplify builtin:blob --method qmat --max-error 0.01 -o blob.ma",
-            "medial simplify builtin:blob --method angle --level 60 -o blob.glb",
-        ],
-    ),
-    (
-        "axis",
-        &["medial axis builtin:blob -o blob.ma", "medial axis builtin:blob --dual delaunay --json"],
-    ),
-    (
-        "evaluate",
-        &[
-            "medial axis builtin:blob -o blob.ma",
-            "medial evaluate builtin:blob blob.ma",
-            "medial evaluate builtin:blob blob.ma --certify 1e-3 --json",
-        ],
-    ),
-    (
-        "render",
-        &[
-            "medial render builtin:bracket -o bracket.png",
-            "medial axis builtin:blob -o blob.ma",
-            "medial render builtin:blob blob.ma --show error -o blob.png",
-        ],
-    ),
-    (
-        "view",
-        &[
-            "medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma",
-            "medial view blob.ma --mesh builtin:blob -o blob.html",
-        ],
-    ),
-    (
-        "reconstruct",
-        &[
-            "medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma",
-            "medial reconstruct blob.ma --mesh builtin:blob -o blob.ply",
-            "medial reconstruct --method power-crust --mesh builtin:blob -o crust.ply",
-        ],
-    ),
-    ("info", &["medial info builtin:torus", "medial info builtin:torus --json"]),
-    (
-        "repair",
-        &[
-            "medial datasets make torus -o torus.off",
-            "medial repair torus.off --fill-holes -o repaired.off",
-            "medial repair torus.off --components largest -o largest.ply",
-        ],
-    ),
-    (
-        "convert",
-        &[
-            "medial axis builtin:blob -o blob.ma",
-            "medial convert blob.ma blob.vtp",
-            "medial convert blob.ma blob.glb --color error --mesh builtin:blob",
-        ],
-    ),
-    (
-        "datasets",
-        &[
-            "medial datasets list",
-            "medial datasets make torus -o torus.off",
-            "medial datasets fetch small",
-        ],
-    ),
-    (
-        "report",
-        &[
-            "medial compare --methods qmat --out qmat",
-            "medial compare --methods hem --out hem",
-            "medial report qmat hem --out merged",
-        ],
-    ),
-    (
-        "diff",
-        &[
-            "medial compare --methods qmat --out old",
-            "medial compare --methods qmat --out new",
-            "medial diff old new",
-        ],
-    ),
-    (
-        "history",
-        &[
-            "medial compare --methods qmat --out today",
-            "medial history runs --add today --commit 1a2b3c4d --date 2026-01-31 -o history.html",
-        ],
-    ),
-];
+const EXAMPLES: &str = "
+medial
+  medial compare
+  medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma
+  medial evaluate builtin:blob blob.ma
+compare
+  medial compare
+  medial compare builtin:torus --methods qmat,hem --spheres 200,50
+  medial compare --dataset builtin --max-error 0.02 --out within-2-percent
+check
+  medial check qmat
+  medial check qmat --set k=0 --timeout 60
+methods
+  medial methods
+  medial methods qmat
+  medial methods --json
+simplify
+  medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma
+  medial simplify builtin:blob --method qmat --max-error 0.01 -o blob.ma
+  medial simplify builtin:blob --method angle --level 60 -o blob.glb
+axis
+  medial axis builtin:blob -o blob.ma
+  medial axis builtin:blob --dual delaunay --json
+evaluate
+  medial axis builtin:blob -o blob.ma
+  medial evaluate builtin:blob blob.ma
+  medial evaluate builtin:blob blob.ma --certify 1e-3 --json
+render
+  medial render builtin:bracket -o bracket.png
+  medial axis builtin:blob -o blob.ma
+  medial render builtin:blob blob.ma --show error -o blob.png
+view
+  medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma
+  medial view blob.ma --mesh builtin:blob -o blob.html
+reconstruct
+  medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma
+  medial reconstruct blob.ma --mesh builtin:blob -o blob.ply
+  medial reconstruct --method power-crust --mesh builtin:blob -o crust.ply
+info
+  medial info builtin:torus
+  medial info builtin:torus --json
+repair
+  medial datasets make torus -o torus.off
+  medial repair torus.off --fill-holes -o repaired.off
+  medial repair torus.off --components largest -o largest.ply
+convert
+  medial axis builtin:blob -o blob.ma
+  medial convert blob.ma blob.vtp
+  medial convert blob.ma blob.glb --color error --mesh builtin:blob
+datasets
+  medial datasets list
+  medial datasets make torus -o torus.off
+  medial datasets fetch small
+report
+  medial compare --methods qmat --out qmat
+  medial compare --methods hem --out hem
+  medial report qmat hem --out merged
+diff
+  medial compare --methods qmat --out old
+  medial compare --methods qmat --out new
+  medial diff old new
+history
+  medial compare --methods qmat --out today
+  medial history runs --add today --commit 1a2b3c4d --date 2026-01-31 -o history.html
+";
 
 /// The examples of a verb, or of the command, as they are shown.
 fn examples(name: &str) -> String {
-    let commands = EXAMPLES.iter().filter(|(known, _)| *known == name).flat_map(|(_, all)| *all);
-    commands.fold("Examples:".to_owned(), |text, command| text + "\n  " + command)
+    let lines = EXAMPLES.lines().skip_while(|line| *line != name).skip(1);
+    let commands = lines.take_while(|line| line.starts_with(' '));
+    commands.fold("Examples:".to_owned(), |text, command| text + "\n" + command)
 }
 
 /// The command line: as derived, with examples, and with the verbs in groups, which clap does not have.
