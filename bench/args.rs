@@ -1,4 +1,4 @@
-//! Arguments that several verbs share, and what they mean to the library.
+//! Arguments that several verbs share, and their conversion to options of the library.
 
 use std::path::PathBuf;
 
@@ -89,12 +89,12 @@ impl SubstrateArguments {
         Ok(ShapeOptions { sampling: self.sampling()?, dual })
     }
 
-    /// Puts what is given into a study.
+    /// Sets the given options in a study.
     ///
     /// # Errors
     /// When the sampling is not understood.
     pub fn apply(&self, study: &mut Study) -> Result<(), Failure> {
-        // Only what is given: a default of the command line must not win over the study file.
+        // Only given options: a default of the command line must not override the study file.
         study.seed = self.seed.unwrap_or(study.seed);
         study.dual = self.dual.unwrap_or(study.dual);
         if self.sampling.is_some() {
@@ -141,7 +141,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// # Errors
 /// When it is none.
 pub fn share(text: &str) -> Result<f64, String> {
-    number(text, |x| x >= 0.0, "a fraction from 0 on, such as 0.05")
+    number(text, |x| x >= 0.0, "a non-negative fraction, for example 0.05")
 }
 
 /// Reads a positive fraction of at most 1.
@@ -149,7 +149,7 @@ pub fn share(text: &str) -> Result<f64, String> {
 /// # Errors
 /// When it is none.
 pub fn fraction(text: &str) -> Result<f64, String> {
-    number(text, |x| x > 0.0 && x <= 1.0, "more than 0 and at most 1")
+    number(text, |x| x > 0.0 && x <= 1.0, "a number above 0 and at most 1")
 }
 
 fn number(text: &str, is_wanted: fn(f64) -> bool, expected: &str) -> Result<f64, String> {
@@ -163,7 +163,7 @@ fn number(text: &str, is_wanted: fn(f64) -> bool, expected: &str) -> Result<f64,
 /// # Errors
 /// When there is no `=`.
 pub fn key_value(text: &str) -> Result<(String, String), String> {
-    let (key, value) = text.split_once('=').ok_or("write key=value")?;
+    let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE")?;
     Ok((key.to_owned(), value.to_owned()))
 }
 

@@ -39,12 +39,12 @@ pub struct Arguments {
 /// Runs the verb.
 ///
 /// # Errors
-/// When a method, a case or a parameter does not exist, or no worker can be started. A case that a
-/// method fails is no error here: it is a line of the output, and sets the exit code.
+/// When a method, a case or a parameter does not exist, or no worker can be started. A failed case is
+/// a line of the output and sets the exit code.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let items = arguments.items(registry)?;
     let interrupted = interrupt::listen();
-    // No record is kept: a case has an outcome only, and no provenance.
+    // A case has no record and needs no provenance.
     let mut supervisor =
         Supervisor::new(registry.files(), &Provenance::default(), None, interrupted);
     let (mut counts, mut list) = ([0; 3], Vec::new());
@@ -72,7 +72,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         let end = match &outcome {
             Outcome::Passed(remarks) if remarks.is_empty() => "ok".to_owned(),
             Outcome::Passed(remarks) => format!("ok ({})", remarks.join("; ")),
-            Outcome::Failed(why) => format!("FAILED: {why} (demanded: {demands})"),
+            Outcome::Failed(why) => format!("FAILED: {why} (expected: {demands})"),
             Outcome::Skipped(why) => format!("skipped: {why}"),
         };
         print_line(&format!("{id:<14} {name:<18} {seconds:>6.1} s  {end}"));
@@ -104,7 +104,7 @@ impl Arguments {
         let known = || cases().iter().map(|case| case.name).collect::<Vec<_>>().join(", ");
         let found = self.cases.iter().map(|name| {
             find(name).ok_or_else(|| {
-                Failure::usage(format!("no case is called `{name}`; there are: {}", known()))
+                Failure::usage(format!("unknown case `{name}` (expected one of: {})", known()))
             })
         });
         found.collect()
@@ -126,7 +126,8 @@ impl Arguments {
             if let Some(key) =
                 params.0.keys().find(|key| documented.iter().all(|p| p.name != **key))
             {
-                return Err(Failure::usage(format!("--set {key}: {id} has no such parameter")));
+                let advice = format!("list them by `medial methods {id}`");
+                return Err(Failure::usage(format!("--set {key}: unknown parameter; {advice}")));
             }
             items.extend(cases.iter().map(|&case| {
                 let method = MethodSpec {

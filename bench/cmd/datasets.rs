@@ -1,4 +1,4 @@
-//! `medial datasets`: the built-in shapes, and the meshes that are kept by name.
+//! `medial datasets`: built-in shapes and published meshes.
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -67,7 +67,7 @@ fn write(make: &Make, global: &Global) -> Result<Exit, Failure> {
     let source = Source::BuiltIn { id: make.id.clone(), resolution: make.resolution };
     let input = Input::load(&source).map_err(Failure::usage)?;
     if !(0.0..=1.0).contains(&make.noise) {
-        return Err(Failure::usage(format!("--noise {}: give a fraction from 0 to 1", make.noise)));
+        return Err(Failure::usage(format!("--noise {}: expected 0 to 1", make.noise)));
     }
     let mesh = medial_datasets::add_noise(&input.mesh, make.noise, make.seed);
     surface::write(&make.output, &mesh).map_err(Failure::input)?;
@@ -89,7 +89,7 @@ const SCRIPT: &str = include_str!("../../scripts/fetch_meshes.py");
 #[derive(Debug, Args)]
 struct Fetch {
     /// Sets (`public`, `defective`, `small`), packages such as `deb:libcgal-demo`, or names of meshes.
-    #[arg(default_value = "public")]
+    #[arg(default_value = "public", value_name = "NAME")]
     wanted: Vec<String>,
     /// Extract meshes from this archive (.deb, .whl, .zip, .tgz, .tar.gz, .tar.xz) or surface file and fetch nothing;
     /// repeatable.
@@ -107,7 +107,7 @@ struct Fetch {
 fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     let library = Library::here()?;
     for word in &arguments.wanted {
-        // Here rather than in the script: the message can name what was meant.
+        // Here rather than in the script: the message can suggest a similar name.
         library.wanted(word)?;
     }
     let failed = |error: std::io::Error| Failure::input(format!("fetch_meshes.py: {error}"));
@@ -118,7 +118,7 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     let mut command = Command::new("python3");
     command.arg(&script).args(&arguments.wanted).arg("--cache").arg(library.folder());
     command.arg("--timeout").arg(arguments.timeout.to_string());
-    // The script reads the variable itself, and knows no embedded catalogue.
+    // The script reads the variable itself, and has no embedded catalogue.
     if env::var_os("MEDIAL_CATALOGUE").is_none_or(|value| value.is_empty()) {
         let catalogue = scratch.path().join("catalogue.toml");
         fs::write(&catalogue, published::EMBEDDED).map_err(failed)?;
@@ -130,13 +130,13 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     command.stderr(if global.quiet { Stdio::null() } else { Stdio::inherit() });
     let output = command.arg("--json").output().map_err(|error| match error.kind() {
         std::io::ErrorKind::NotFound => {
-            Failure::input("python3 3.11 or later is needed to fetch meshes; install it")
+            Failure::input("python3: not found; install Python 3.11 or later")
         }
         _ => failed(error),
     })?;
     let exit = match output.status.code() {
         Some(0) => Exit::Done,
-        // Missing meshes are no error of the command: the others are stored.
+        // Missing meshes are not an error of the command: the others are stored.
         Some(3) => Exit::SomeFailed,
         _ => return Err(Failure::input(format!("fetch_meshes.py: {}", output.status))),
     };
@@ -146,7 +146,7 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
         print_json(&report, &[]);
     } else {
         print_line(&format!(
-            "{} of {} meshes are stored in {}, {} are new",
+            "{} of {} meshes stored in {}, {} new",
             report["verified"],
             report["wanted"],
             library.folder().display(),
@@ -156,7 +156,7 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     Ok(exit)
 }
 
-/// Lists everything that has a name.
+/// Lists built-in shapes and published meshes.
 ///
 /// # Errors
 /// When the library cannot be read.
@@ -189,7 +189,7 @@ fn list_all(global: &Global) -> Result<Exit, Failure> {
         ));
     }
     let in_default = shapes.iter().filter(|shape| shape.in_default).count();
-    print_line(&format!("compare --dataset builtin takes the first {in_default}"));
+    print_line(&format!("`medial compare --dataset builtin` runs the first {in_default}"));
     for set in Set::ALL {
         print_set(set, &states);
     }
@@ -227,8 +227,8 @@ fn print_set(set: Set, states: &[(&Published, State)]) {
 fn how(set: Set) -> &'static str {
     match set {
         Set::Public => "`medial datasets fetch public`, then `medial compare --dataset public`",
-        Set::Defective => "refused or to be repaired: `medial datasets fetch defective`",
-        Set::Small => "sound, of few vertices: `medial datasets fetch small`",
-        Set::Papers => "models of papers, taken by `medial datasets fetch --from FILE`",
+        Set::Defective => "defective meshes: `medial datasets fetch defective`",
+        Set::Small => "sound meshes of few vertices: `medial datasets fetch small`",
+        Set::Papers => "models of papers: add your copies by `medial datasets fetch --from FILE`",
     }
 }

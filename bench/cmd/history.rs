@@ -1,4 +1,4 @@
-//! `medial history DIR`: the results of many runs, and where they changed.
+//! `medial history DIR`: the change points of many runs.
 
 use std::path::PathBuf;
 
@@ -41,13 +41,13 @@ pub struct Arguments {
 /// When the results or the history cannot be read, the run cannot be added, or the page cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let Arguments { folder, output, least_step, .. } = arguments;
-    // Before a run is added, which cannot be taken back.
+    // Before a run is added, which cannot be undone.
     output.as_deref().map_or(Ok(()), files::check_folder)?;
     let (added, mut warnings) = add(arguments)?;
     let (runs, damaged) = read_runs(folder).map_err(Failure::input)?;
-    warnings.extend(damaged.iter().map(|error| format!("left out: {error}")));
+    warnings.extend(damaged.iter().map(|error| format!("skipped: {error}")));
     if runs.is_empty() {
-        let why = warnings.first().map_or("no run in it".to_owned(), Clone::clone);
+        let why = warnings.first().map_or("no runs; add one by --add".to_owned(), Clone::clone);
         let message = format!("{}: {why}", folder.display());
         return Err(Failure { code: Exit::NothingMeasured, message });
     }

@@ -1,4 +1,4 @@
-//! `medial repair IN -o OUT`: a surface that bounds a solid, from one that nearly does.
+//! `medial repair IN -o OUT`: repairs a surface that nearly bounds a solid.
 
 use std::path::PathBuf;
 
@@ -30,7 +30,7 @@ pub struct Arguments {
     components: Keep,
 }
 
-/// Which parts to keep.
+/// Parts of the result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Keep {
     /// The part with the largest area.
@@ -51,10 +51,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     };
     let Arguments { fill_holes, separate, .. } = *arguments;
     let options = MendOptions { fill_holes, separate, components };
-    let mended = surface::mend(&arguments.input, options).map_err(Failure::input)?;
-    // Only a solid comes this far: a surface that is still refused is an error above.
-    surface::write(&arguments.output, &mended.mesh).map_err(Failure::input)?;
-    let report = mended.report;
+    // An error unless the repaired surface bounds a solid.
+    let repaired = surface::mend(&arguments.input, options).map_err(Failure::input)?;
+    surface::write(&arguments.output, &repaired.mesh).map_err(Failure::input)?;
+    let report = repaired.report;
     let object = json!({
         "output": arguments.output, "vertices": report.vertices, "faces": report.faces,
         "components": report.components, "genus": report.genus, "repairs": report.repairs,

@@ -12,7 +12,7 @@ use medial::{complex, surface};
 use medial_methods::aof::LatticeVoxels;
 use medial_methods::tam_heidrich::{OuterPoles, PartInfo, RemainingPoles};
 use medial_methods::{aof, tam_heidrich};
-use medial_reports::{Simplify, Status, file_stem};
+use medial_reports::{Simplify, Status, file_stem, significant};
 use serde::Serialize;
 use serde_json::json;
 
@@ -73,7 +73,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let entry = method(registry, &arguments.method)?;
     let options = arguments.substrate.shape_options()?;
-    // All slips that show without the mesh are refused before it is read.
+    // Errors that need no mesh are reported before it is read.
     arguments.outputs.check(entry.method())?;
     let line = StageLine::new(global.stages());
     line.at("reading");
@@ -81,7 +81,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     if arguments.outputs.is_empty() && !global.json {
         let example = format!("{}-{}.ma", file_stem(&input.name), arguments.method);
         return Err(Failure::usage(format!(
-            "the result would be lost: write it with -o {example}, or print its figures with --json"
+            "no output: write the result with -o {example}, or print its figures with --json"
         )));
     }
     let mut warnings = input.report.warnings.clone();
@@ -133,17 +133,20 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     Ok(Exit::Done)
 }
 
-/// What is to be said where the result, or what it was made from, has not the solid's topology.
+/// Warnings for a result, and its initial medial mesh, without the solid's topology.
 fn topology_warnings(result: &MedialMesh, shape: &Shape) -> Vec<String> {
     let expected = shape.expected_betti();
-    // The start is only looked at where the result is wrong: its topology takes longer.
+    // The topology of the initial medial mesh takes longer: only for wrong results.
     let Some(own) = topology_warning(complex::betti(result), expected) else { return Vec::new() };
     let initial = shape.initial().ok();
     let start = initial.and_then(|initial| topology_warning(complex::betti(&initial), expected));
     let start = start.map(|start| {
         format!("the initial medial mesh is not right either ({start}); `--sampling auto` adds samples where it fails")
     });
-    [Some(format!("the topology is not the solid's: {own}")), start].into_iter().flatten().collect()
+    [Some(format!("the topology differs from the solid's: {own}")), start]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// The list of parts with their centres as in the input.
@@ -157,7 +160,7 @@ fn in_input_units(parts: &[PartInfo], shape: &Shape) -> serde_json::Result<serde
 }
 
 impl Arguments {
-    /// Runs the method at the level that is asked, or at the one that a search finds.
+    /// Runs the method at the requested level, or at the one that a search finds.
     fn run(
         &self,
         entry: &Entry,
@@ -186,11 +189,11 @@ impl Arguments {
         let judge = judge.map_err(|error| self.failure(SimplifyError::from(error).into()))?;
         let measure = |mesh: &MedialMesh| -> Result<f64, String> {
             let sampled = judge.distances(mesh).map_err(|error| error.to_string())?.hausdorff;
-            // Samples are a lower bound: what they refuse needs no certificate.
+            // Samples are a lower bound: above the error bound, no certificate is needed.
             if !self.certify || sampled > bound {
                 return Ok(sampled);
             }
-            // An upper end within the bound needs an interval that is narrow beside it.
+            // An upper end within the bound needs an interval much narrower than the bound.
             let certified = judge.certify(mesh, CERTIFIED_SHARE * bound);
             Ok(certified.map_err(|error| error.to_string())?.upper)
         };
@@ -239,7 +242,7 @@ fn print_result(simplify: &Simplify, search: Option<&Searched>, arguments: &Argu
         seconds.simplify
     ));
     if let Some(level) = simplify.native_level {
-        print_line(&format!("  native level {level}"));
+        print_line(&format!("  native level {}", significant(level, 4)));
     }
     if let Some(search) = search {
         print_line(&format!(
@@ -252,7 +255,7 @@ fn print_result(simplify: &Simplify, search: Option<&Searched>, arguments: &Argu
     arguments.outputs.written().iter().for_each(|line| print_line(&format!("  {line}")));
 }
 
-/// What a search over sphere counts found, for the answer to `--max-error`.
+/// The result of a search for `--max-error`, for JSON.
 #[derive(Debug, Serialize)]
 struct Searched {
     /// The bound, a fraction of the diagonal.
@@ -271,13 +274,12 @@ struct Searched {
 const CERTIFIED_SHARE: f64 = 0.05;
 
 /// Reads a bound.
-// The whole solid is within one diagonal of anything inside it, so that 1 and more are a slip.
+// The whole solid is within one diagonal of each of its points, so that 1 and more are implausible.
 fn error_bound(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(bound) if bound > 0.0 && bound < 1.0 => Ok(bound),
         Ok(bound) if bound >= 1.0 && bound.is_finite() => Err(format!(
-            "a fraction of the diagonal is meant, and this is {} % of it; write {} for {bound} %",
-            100.0 * bound,
+            "expected a fraction of the diagonal below 1; write {} for {bound} %",
             bound / 100.0
         )),
         _ => Err("expected a positive fraction of the diagonal".to_owned()),
@@ -311,10 +313,10 @@ enum Outer {
 }
 
 impl Outputs {
-    /// Refuses what the method has not or what could not be written, before anything is computed.
+    /// Refuses outputs that the method lacks or that cannot be written, before any computation.
     ///
     /// # Errors
-    /// When an extension is unknown, a folder not there, or the method has no such thing.
+    /// When an extension is unknown, a folder is missing, or the method has no voxels or poles.
     fn check(&self, method: &dyn MedialSimplifier) -> Result<(), Failure> {
         let info = method.info();
         check_output(self.output.as_deref())?;
@@ -339,10 +341,9 @@ impl Outputs {
     /// Writes the requested files.
     ///
     /// # Errors
-    /// When the poles have no power crust, and then nothing is written, or when a file cannot be
-    /// written.
+    /// When the poles have no power crust, and then nothing is written, or when a file cannot be written.
     fn write(&self, result: &Simplified, shape: &Shape) -> Result<(), Failure> {
-        // Before anything is written: whether there is a crust shows only when it is made.
+        // Before the first file is written: only its construction shows whether there is a crust.
         let crust = match (&self.power_crust, result.extras.get()) {
             (Some(path), Some(poles)) => Some((path, self.crust(path, poles, shape)?)),
             _ => None,
@@ -375,19 +376,19 @@ impl Outputs {
         let crust = poles.power_crust(shape, outer).map_err(|error| Failure::at(path, error))?;
         let mut crust = surface::crust_surface(&crust, COINCIDENT).mesh;
         if crust.faces.is_empty() {
-            return Err(Failure::at(path, "no pole is left: nothing to make a surface of"));
+            return Err(Failure::at(path, "no pole remains for a surface; request a finer level"));
         }
         let back = shape.normalisation();
         crust.vertices.iter_mut().for_each(|vertex| *vertex = back.backward(*vertex));
         Ok(crust)
     }
 
-    /// What was written, a line each.
+    /// A line for each written file.
     fn written(&self) -> Vec<String> {
         let files = [
             (&self.output, ""),
             (&self.voxels, ", a point for each voxel"),
-            (&self.power_crust, ", the power crust of the poles that are left"),
+            (&self.power_crust, ", the power crust of the remaining poles"),
         ];
         let written = files.into_iter().filter_map(|(path, what)| {
             path.as_ref().map(|path| format!("written: {}{what}", path.display()))

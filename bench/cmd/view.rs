@@ -1,4 +1,4 @@
-//! `medial view X.ma [Y.ma ...] -o view.html`: medial meshes beside each other in a browser.
+//! `medial view X.ma [Y.ma ...] -o view.html`: medial meshes side by side in a browser.
 
 use std::path::PathBuf;
 
@@ -45,7 +45,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     for path in paths {
         let (axis, remarks) = complex::read(path).map_err(Failure::input)?.with_remarks();
         if axis.spheres.is_empty() {
-            return Err(Failure::at(path, "no sphere to show"));
+            return Err(Failure::at(path, "no sphere"));
         }
         notes.extend(remarks);
         axes.push(axis);
@@ -72,7 +72,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// The corners of the box of some unions, without faces: what the camera has to hold.
+/// The corners of the box of some unions, without faces, for the camera.
 fn box_of(axes: &[MedialMesh]) -> TriMesh {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for sphere in axes.iter().flat_map(|axis| &axis.spheres) {
