@@ -322,11 +322,12 @@ fn scratch_probe() {
 fn temporary_files_are_in_the_scratch_folder_and_removed() {
     let scratch = tempfile::tempdir().expect("a folder");
     let probe = Command::new(std::env::current_exe().expect("this program"))
-        .args(["--ignored", "--exact", "scratch_probe"])
+        .args(["--ignored", "--exact", "plugin::scratch_probe"])
         .env(SCRATCH, scratch.path())
         .output()
         .expect("runs");
-    assert!(probe.status.success(), "{}", String::from_utf8_lossy(&probe.stdout));
+    let printed = String::from_utf8_lossy(&probe.stdout);
+    assert!(probe.status.success() && printed.contains("1 passed"), "{printed}");
 }
 
 #[test]
