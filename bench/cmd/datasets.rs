@@ -90,7 +90,7 @@ const SCRIPT: &str = include_str!("../../scripts/fetch_meshes.py");
 struct Fetch {
     /// Sets (`public`, `defective`, `small`), packages such as `deb:libcgal-demo`, or names of meshes.
     #[arg(default_value = "public", value_name = "NAME")]
-    wanted: Vec<String>,
+    names: Vec<String>,
     /// Extract meshes from this archive (.deb, .whl, .zip, .tgz, .tar.gz, .tar.xz) or surface file and fetch nothing;
     /// repeatable.
     #[arg(long, value_name = "ARCHIVE")]
@@ -106,9 +106,9 @@ struct Fetch {
 /// When a word is unknown, Python is not installed, or the script refuses its input.
 fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     let library = Library::here()?;
-    for word in &arguments.wanted {
+    for word in &arguments.names {
         // Here rather than in the script: the message can suggest a similar name.
-        library.wanted(word)?;
+        library.matching(word)?;
     }
     let failed = |error: std::io::Error| Failure::input(format!("fetch_meshes.py: {error}"));
     // The script is a part of this program: nothing has to be installed next to it.
@@ -116,7 +116,7 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     let script = scratch.path().join("fetch_meshes.py");
     fs::write(&script, SCRIPT).map_err(failed)?;
     let mut command = Command::new("python3");
-    command.arg(&script).args(&arguments.wanted).arg("--cache").arg(library.folder());
+    command.arg(&script).args(&arguments.names).arg("--cache").arg(library.folder());
     command.arg("--timeout").arg(arguments.timeout.to_string());
     // The script reads the variable itself, and has no embedded catalogue.
     if env::var_os("MEDIAL_CATALOGUE").is_none_or(|value| value.is_empty()) {

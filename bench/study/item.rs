@@ -156,14 +156,14 @@ impl Keep {
         let is_requested = matches!(level, Target::Spheres(_) | Target::MaxError(_));
         match self {
             Self::All => true,
-            Self::Small => is_requested || item.method.id == GIVEN || spheres <= MOST_KEPT,
+            Self::Small => is_requested || item.method.id == GIVEN || spheres <= MOST_SMALL,
             Self::None => false,
         }
     }
 }
 
 /// Most spheres of a result on disk at a native or published level.
-const MOST_KEPT: usize = 1_000;
+const MOST_SMALL: usize = 1_000;
 
 impl Item {
     /// The key of one level: equal for equal work. It is independent of limits and of the number of

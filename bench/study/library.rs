@@ -126,15 +126,15 @@ impl Library {
     ///
     /// # Errors
     /// [`PublicError::Name`].
-    pub fn wanted(&self, word: &str) -> Result<Vec<&Published>, PublicError> {
+    pub fn matching(&self, word: &str) -> Result<Vec<&Published>, PublicError> {
         let set = Set::ALL.into_iter().find(|set| set.key() == word);
-        let mut wanted: Vec<_> = self.catalogue.meshes.iter().collect();
-        wanted.retain(|mesh| match set {
+        let mut found: Vec<_> = self.catalogue.meshes.iter().collect();
+        found.retain(|mesh| match set {
             Some(set) => mesh.set == set,
             None => mesh.package == word || mesh.name == word,
         });
         // A set may be empty, but an unknown package or mesh is an error.
-        if wanted.is_empty() && set.is_none() { Err(self.unknown(word)) } else { Ok(wanted) }
+        if found.is_empty() && set.is_none() { Err(self.unknown(word)) } else { Ok(found) }
     }
 
     /// The inputs of a word of `--dataset`: a built-in shape, a set, the usable meshes of a package, or one mesh.
@@ -145,13 +145,13 @@ impl Library {
         if medial_datasets::find(word).is_some() {
             return Ok(vec![Source::BuiltIn { id: word.to_owned(), resolution: None }]);
         }
-        let mut wanted = self.wanted(word)?;
+        let mut found = self.matching(word)?;
         // A package may hold defective meshes, which a comparison would refuse.
-        if wanted.iter().all(|mesh| mesh.package == word) {
-            wanted.retain(|mesh| mesh.set == Set::Public);
+        if found.iter().all(|mesh| mesh.package == word) {
+            found.retain(|mesh| mesh.set == Set::Public);
         }
         let (mut sources, mut missing) = (Vec::new(), Vec::new());
-        for mesh in wanted {
+        for mesh in found {
             if self.state(mesh)? == State::Here {
                 let (name, set) = (mesh.name.clone(), mesh.set.key().to_owned());
                 sources.push(Source::Cached { name, set, path: self.path(mesh) });

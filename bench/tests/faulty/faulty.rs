@@ -138,7 +138,7 @@ fn talks() -> Result<(), SimplifyError> {
 }
 
 /// Leaves a running process outside of the process group.
-fn strays() -> Result<(), SimplifyError> {
+fn orphans() -> Result<(), SimplifyError> {
     let started = Command::new("setsid").args(["sleep", "7654"]).spawn();
     let started = started.or_else(|_| Command::new("sleep").arg("7654").spawn());
     started.map(|_| ()).map_err(|error| SimplifyError::Failed(error.to_string()))
@@ -176,7 +176,7 @@ fn main() -> ExitCode {
         late("invalid", invalid),
         late("empty", empty),
         early("talks", talks),
-        early("strays", strays),
+        early("orphans", orphans),
         late("random", random),
         late("warms-up", warms_up),
         early("waits", waits),

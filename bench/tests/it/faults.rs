@@ -33,7 +33,7 @@ fn faults_of_methods_are_contained_and_named() {
     let at = folder();
     let common = "--spheres 30,20,10 --samples 100 --memory 1500 --methods";
     let methods =
-        "panics,allocates,grows,overflows,aborts,exits,invalid,empty,talks,strays,complains,qmat";
+        "panics,allocates,grows,overflows,aborts,exits,invalid,empty,talks,orphans,complains,qmat";
     // Methods that end by themselves, or by their memory, may take longer on a busy machine.
     compare(&format!("--timeout 60 {common} {methods}"), &at("out"), 3);
     let ends = ends(&compare(&format!("--timeout 10 {common} loops"), &at("out"), 3));
@@ -64,7 +64,7 @@ fn faults_of_methods_are_contained_and_named() {
         let (found, reason) = end(method, 30);
         assert!(found == status && reason.contains(part), "{method}: {found}, {reason}");
     }
-    for method in ["talks", "strays", "qmat"] {
+    for method in ["talks", "orphans", "qmat"] {
         assert!([30, 20, 10].iter().all(|&count| end(method, count).0 == "ok"), "{method}");
     }
     assert_eq!(ends.len(), 39);

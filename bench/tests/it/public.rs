@@ -140,7 +140,7 @@ impl Machine {
         (code, object.unwrap_or_else(|error| panic!("{error}: {stdout}{stderr}")), stderr)
     }
 
-    fn kept(&self, name: &str) -> Option<Vec<u8>> {
+    fn cached(&self, name: &str) -> Option<Vec<u8>> {
         fs::read(self.at("cache/meshes").join(name)).ok()
     }
 }
@@ -160,7 +160,7 @@ fn fetched_meshes_are_not_fetched_again() {
     let (code, object, stderr) = machine.json(&["datasets", "fetch", "public"]);
     assert_eq!(code, 0, "{stderr}");
     assert_eq!((&object["verified"], &object["wanted"]), (&3.into(), &3.into()), "{object}");
-    assert_eq!(machine.kept("rod-thin.off"), Some(content("rod-thin")));
+    assert_eq!(machine.cached("rod-thin.off"), Some(content("rod-thin")));
     let log = machine.log();
     assert_eq!(log.len(), 2, "{log:?}");
     assert!(log[0].contains("download") && log[0].ends_with("balls=1.0"), "{log:?}");
@@ -206,8 +206,8 @@ fn another_content_is_refused_by_name() {
     assert_eq!(code, 3);
     assert_eq!(object["missing"], json!(["ring"]));
     assert!(stderr.contains("ring: package/ring.off of ring.tgz has another content"), "{stderr}");
-    assert_eq!(machine.kept("ring.off"), None);
-    assert_eq!(machine.kept("ball.off"), Some(content("ball")));
+    assert_eq!(machine.cached("ring.off"), None);
+    assert_eq!(machine.cached("ball.off"), Some(content("ball")));
 }
 
 #[test]
@@ -217,7 +217,7 @@ fn a_missing_client_is_reported_once_and_the_rest_continues() {
     let (code, _, stderr) = machine.run(&["datasets", "fetch"]);
     assert_eq!(code, 3);
     assert_eq!(stderr.matches("apt-get is not installed").count(), 1, "{stderr}");
-    assert!(machine.kept("ring.off").is_some());
+    assert!(machine.cached("ring.off").is_some());
     machine.client("apt-get", "echo no such package >&2; exit 100");
     let (_, _, stderr) = machine.run(&["datasets", "fetch"]);
     assert!(stderr.contains("no such package"), "{stderr}");
@@ -236,7 +236,7 @@ fn identical_meshes_of_another_version_are_accepted() {
     assert_eq!(object["missing"], json!(["rod-thin"]), "{stderr}");
     assert!(stderr.contains("identical meshes from another version"), "{stderr}");
     assert!(stderr.contains("rod-thin: share/data.tar.gz!data/rod.off of"), "{stderr}");
-    assert_eq!(machine.kept("ball.off"), Some(content("ball")));
+    assert_eq!(machine.cached("ball.off"), Some(content("ball")));
 }
 
 #[test]

@@ -9,8 +9,8 @@ use crate::command::{MEDIAL, done, folder, json, refused};
 fn python() -> Option<String> {
     let made = concat!(env!("CARGO_MANIFEST_DIR"), "/../target/readers/python/bin/python");
     let python = std::env::var("READERS_PYTHON").unwrap_or_else(|_| made.to_owned());
-    let answer = Command::new(&python).args(["-c", "import vtk, trimesh"]).output();
-    answer.is_ok_and(|output| output.status.success()).then_some(python)
+    let output = Command::new(&python).args(["-c", "import vtk, trimesh"]).output();
+    output.is_ok_and(|done| done.status.success()).then_some(python)
 }
 
 #[test]

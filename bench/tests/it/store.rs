@@ -352,13 +352,13 @@ fn a_study_in_a_folder_with_any_name_is_read_back() {
     // A name without a folder is in the working folder.
     assert_eq!(compare(Path::new("study.toml"), &folder), (1, 0));
     assert!(fs::read_dir(folder.join("out/pictures")).is_ok_and(|drawn| drawn.count() > 0));
-    let kept = folder.join("out/study.toml");
-    let named = fs::read_to_string(&kept).expect("a copy");
+    let copy = folder.join("out/study.toml");
+    let named = fs::read_to_string(&copy).expect("a copy");
     let named: toml::Table = named.parse().expect("TOML");
     let absolute = fs::canonicalize(&folder).expect("a folder");
     let given = Path::new(named["folder"].as_str().expect("a text"));
     assert_eq!(fs::canonicalize(given).expect("a folder"), absolute);
-    assert_eq!(compare(&kept, &folder), (0, 1), "the copy requests the same");
+    assert_eq!(compare(&copy, &folder), (0, 1), "the copy requests the same");
 }
 
 #[test]
@@ -507,7 +507,7 @@ fn shards_and_jobs_have_the_results_of_one_run() {
     let table = |out: &str| -> Vec<Vec<String>> {
         let mut rows = csv::Reader::from_path(at(out).join("results.csv")).expect("a table");
         let heads = rows.headers().expect("a head").clone();
-        let kept: Vec<usize> = (0..heads.len())
+        let columns: Vec<usize> = (0..heads.len())
             .filter(|&k| {
                 let timed = ["seconds", "substrate_", "bytes", "command", "repetition", "jobs"];
                 !timed.iter().any(|word| heads[k].contains(word))
@@ -515,7 +515,7 @@ fn shards_and_jobs_have_the_results_of_one_run() {
             .collect();
         rows.records()
             .map(|row| row.expect("a row"))
-            .map(|row| kept.iter().map(|&k| row[k].to_owned()).collect())
+            .map(|row| columns.iter().map(|&k| row[k].to_owned()).collect())
             .collect()
     };
     assert_eq!([table("all"), table("jobs")], [table("whole"), table("whole")]);
