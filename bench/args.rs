@@ -1,4 +1,4 @@
-//! Arguments that several verbs share, and what they mean to the library.
+//! Arguments that several verbs share, and their conversion to options of the library.
 
 use std::path::PathBuf;
 
@@ -19,10 +19,10 @@ use crate::study::{MOST_SAMPLES, MOST_THREADS, Study};
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Global options")]
 pub struct Global {
-    /// Print one JSON object on standard output, and nothing else there.
+    /// Print one JSON object on standard output and nothing else.
     #[arg(long, global = true)]
     pub json: bool,
-    /// Number of threads [default: all processors].
+    /// Use N threads [default: all processors].
     #[arg(
         long,
         global = true,
@@ -30,10 +30,10 @@ pub struct Global {
         value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_THREADS as u64)
     )]
     pub threads: Option<usize>,
-    /// No progress on standard error.
+    /// Hide progress.
     #[arg(long, short, global = true)]
     pub quiet: bool,
-    /// Methods that are programs of their own, declared in a TOML file; can be given several times.
+    /// Add the methods declared in a plug-in file; repeatable.
     #[arg(long, global = true, value_name = "FILE")]
     pub plugins: Vec<PathBuf>,
 }
@@ -44,7 +44,7 @@ impl Global {
         if self.quiet { Verbosity::Quiet } else { Verbosity::Progress }
     }
 
-    /// Whether the stages of a single piece of work are shown: not beside JSON, which is for programs.
+    /// Whether the stages of a single task are shown. JSON output is for programs and hides them.
     pub fn stages(&self) -> Verbosity {
         if self.json { Verbosity::Quiet } else { self.progress() }
     }
@@ -59,7 +59,7 @@ pub struct SubstrateArguments {
     /// Triangulation of the dual Voronoi polygons [default: fan].
     #[arg(long, value_enum)]
     pub dual: Option<Dual>,
-    /// Seed of every random choice [default: 0].
+    /// Set the seed of every random choice [default: 0].
     #[arg(long)]
     pub seed: Option<u64>,
 }
@@ -89,12 +89,12 @@ impl SubstrateArguments {
         Ok(ShapeOptions { sampling: self.sampling()?, dual })
     }
 
-    /// Puts what is given into a study.
+    /// Sets the given options in a study.
     ///
     /// # Errors
     /// When the sampling is not understood.
     pub fn apply(&self, study: &mut Study) -> Result<(), Failure> {
-        // Only what is given: a default of the command line must not win over the study file.
+        // Only given options: a default of the command line must not override the study file.
         study.seed = self.seed.unwrap_or(study.seed);
         study.dual = self.dual.unwrap_or(study.dual);
         if self.sampling.is_some() {
@@ -107,8 +107,8 @@ impl SubstrateArguments {
 /// How results are measured.
 #[derive(Clone, Debug, Args)]
 pub struct MeasureArguments {
-    /// Surface samples for the error, beside the mesh's vertices; as many on the reconstruction
-    /// [default: 50000, `compare` 10000].
+    /// Measure errors at N surface samples in addition to the vertices, and at N samples of the
+    /// reconstruction [default: 50000, `compare` 10000].
     #[arg(
         long,
         value_name = "N",
@@ -141,7 +141,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// # Errors
 /// When it is none.
 pub fn share(text: &str) -> Result<f64, String> {
-    number(text, |x| x >= 0.0, "a fraction from 0 on, such as 0.05")
+    number(text, |x| x >= 0.0, "a non-negative fraction, for example 0.05")
 }
 
 /// Reads a positive fraction of at most 1.
@@ -149,7 +149,7 @@ pub fn share(text: &str) -> Result<f64, String> {
 /// # Errors
 /// When it is none.
 pub fn fraction(text: &str) -> Result<f64, String> {
-    number(text, |x| x > 0.0 && x <= 1.0, "more than 0 and at most 1")
+    number(text, |x| x > 0.0 && x <= 1.0, "a number above 0 and at most 1")
 }
 
 fn number(text: &str, is_wanted: fn(f64) -> bool, expected: &str) -> Result<f64, String> {
@@ -163,7 +163,7 @@ fn number(text: &str, is_wanted: fn(f64) -> bool, expected: &str) -> Result<f64,
 /// # Errors
 /// When there is no `=`.
 pub fn key_value(text: &str) -> Result<(String, String), String> {
-    let (key, value) = text.split_once('=').ok_or("write key=value")?;
+    let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE")?;
     Ok((key.to_owned(), value.to_owned()))
 }
 

@@ -21,7 +21,7 @@ use crate::study::registry::Registry;
 #[derive(Debug, Parser)]
 #[command(name = "medial", version, arg_required_else_help = true)]
 pub struct Cli {
-    /// What every verb takes.
+    /// Options of every verb.
     #[command(flatten)]
     pub global: Global,
     /// The verb.
@@ -71,25 +71,24 @@ pub enum Verb {
         #[arg(value_enum)]
         shell: Shell,
     },
-    /// Serve items on standard input: what `compare` starts.
+    /// Serve the items on standard input; `compare` starts it.
     #[command(hide = true)]
     Worker {
-        /// Limit of memory.
+        /// Limit of memory in bytes.
         #[arg(long, default_value_t = u64::MAX)]
         bytes: u64,
     },
 }
 
-/// The command with these methods: parses the command line, runs the verb, and turns the outcome
-/// into an exit code.
+/// The command with these methods: parses the command line, runs the verb, and turns the result into an exit code.
 pub fn main_with(methods: Vec<Registered>) -> ExitCode {
     run_with(methods, None, std::env::args_os()).into()
 }
 
-/// [`main_with`] inside another program, which loads plug-ins of its own language.
+/// [`main_with`] inside another program, which loads plug-ins written in its language.
 ///
 /// # Panics
-/// When called twice: the command belongs to its process.
+/// When called twice in a process.
 pub fn main_hosted(methods: Vec<Registered>, host: Host, loader: Box<dyn ScriptLoader>) -> Exit {
     let words = std::iter::once(OsString::from("medial")).chain(host.words.iter().cloned());
     let words: Vec<OsString> = words.collect();
@@ -107,13 +106,13 @@ fn run_with(
     let matches = command().try_get_matches_from(words);
     let cli = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
-        // Help and version are asked for, and belong on standard output.
+        // Requested help and version belong on standard output.
         Err(error) if !error.use_stderr() => {
             print_raw(&error.render().to_string());
             return exit_after_output(Exit::Done);
         }
         Err(error) => {
-            // Nobody can be told where standard error is closed.
+            // Nothing can be reported where standard error is closed.
             let _ = error.print();
             return Exit::Usage;
         }
@@ -138,9 +137,86 @@ const GROUPS: [(&str, &[&str]); 4] = [
     ("Results of comparisons", &["report", "diff", "history"]),
 ];
 
-/// The command line: as derived, with the verbs in groups, which clap does not have.
+/// Examples at the end of the help: of the command for all verbs, then of each verb.
+const EXAMPLES: &str = "
+medial
+  medial compare
+  medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma
+  medial evaluate builtin:blob blob.ma
+compare
+  medial compare
+  medial compare builtin:torus --methods qmat,hem --spheres 200,50
+  medial compare --dataset builtin --max-error 0.02 --out within-2-percent
+check
+  medial check qmat
+  medial check qmat --set k=0 --timeout 60
+methods
+  medial methods
+  medial methods qmat
+  medial methods --json
+simplify
+  medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma
+  medial simplify builtin:blob --method qmat --max-error 0.01 -o blob.ma
+  medial simplify builtin:blob --method angle --level 60 -o blob.glb
+axis
+  medial axis builtin:blob -o blob.ma
+  medial axis builtin:blob --dual delaunay --json
+evaluate
+  medial axis builtin:blob -o blob.ma
+  medial evaluate builtin:blob blob.ma
+  medial evaluate builtin:blob blob.ma --certify 1e-3 --json
+render
+  medial render builtin:bracket -o bracket.png
+  medial axis builtin:blob -o blob.ma
+  medial render builtin:blob blob.ma --show error -o blob.png
+view
+  medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma
+  medial view blob.ma --mesh builtin:blob -o blob.html
+reconstruct
+  medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma
+  medial reconstruct blob.ma --mesh builtin:blob -o blob.ply
+  medial reconstruct --method power-crust --mesh builtin:blob -o crust.ply
+info
+  medial info builtin:torus
+  medial info builtin:torus --json
+repair
+  medial datasets make torus -o torus.off
+  medial repair torus.off --fill-holes -o repaired.off
+  medial repair torus.off --components largest -o largest.ply
+convert
+  medial axis builtin:blob -o blob.ma
+  medial convert blob.ma blob.vtp
+  medial convert blob.ma blob.glb --color error --mesh builtin:blob
+datasets
+  medial datasets list
+  medial datasets make torus -o torus.off
+  medial datasets fetch small
+report
+  medial compare --methods qmat --out qmat
+  medial compare --methods hem --out hem
+  medial report qmat hem --out merged
+diff
+  medial compare --methods qmat --out old
+  medial compare --methods qmat --out new
+  medial diff old new
+history
+  medial compare --methods qmat --out today
+  medial history runs --add today --commit 1a2b3c4d --date 2026-01-31 -o history.html
+";
+
+/// The examples of a verb, or of the command, as they are shown.
+fn examples(name: &str) -> String {
+    let lines = EXAMPLES.lines().skip_while(|line| *line != name).skip(1);
+    let commands = lines.take_while(|line| line.starts_with(' '));
+    commands.fold("Examples:".to_owned(), |text, command| text + "\n" + command)
+}
+
+/// The command line: as derived, with examples, and with the verbs in groups, which clap does not have.
 pub fn command() -> Command {
-    let command = Cli::command();
+    let command = Cli::command().mut_subcommands(|verb| {
+        let examples = examples(verb.get_name());
+        if verb.is_hide_set() { verb } else { verb.after_help(examples) }
+    });
     let mut help = String::from("{about}\n\n{usage-heading} {usage}\n");
     for (group, verbs) in GROUPS {
         help.push_str(&format!("\n{group}:\n"));
@@ -150,9 +226,8 @@ pub fn command() -> Command {
             help.push_str(&format!("  {verb:<13}{about}\n"));
         }
     }
-    help.push_str(
-        "\nGlobal options:\n{options}\n\n`medial VERB --help` describes the options of a verb.\n",
-    );
+    help.push_str(&format!("\n{}\n\nGlobal options:\n{{options}}\n\n", examples("medial")));
+    help.push_str("Describe the options of a verb by `medial VERB --help`.\n");
     command.help_template(help)
 }
 

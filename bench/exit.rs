@@ -1,4 +1,4 @@
-//! How a verb ends: its exit code, and the sentence that says what went wrong.
+//! The exit codes of the verbs, and their error messages.
 
 use std::fmt::Display;
 use std::path::Path;
@@ -41,7 +41,7 @@ impl From<Exit> for ExitCode {
 pub struct Failure {
     /// The exit code.
     pub code: Exit,
-    /// What is wrong and what to do, one sentence.
+    /// `INPUT: PROBLEM; ADVICE`, one line in lower case without a full stop.
     pub message: String,
 }
 
@@ -67,7 +67,7 @@ impl From<StudyError> for Failure {
         match error {
             StudyError::Input(error) => error.into(),
             StudyError::Library(error) => error.into(),
-            // A file is input, its values stand for options.
+            // A file is input, its values replace options.
             StudyError::File { .. } => Self::input(error),
             _ => Self::usage(error),
         }

@@ -9,7 +9,7 @@ use medial::shape::{Shape, ShapeOptions};
 use crate::exit::Failure;
 use crate::study::source::{Input, Source};
 
-/// Reads a surface or makes a built-in one, and the shape of it. What is wrong names the surface.
+/// Reads a surface or makes a built-in one, and the shape of it. Errors name the surface.
 ///
 /// # Errors
 /// When it does not exist, is refused, or has no extent.
@@ -44,29 +44,29 @@ pub fn is_medial(path: &Path) -> Result<bool, Failure> {
     }
 }
 
-/// What the first line says that says anything.
-fn any_line(path: &Path, says: impl Fn(&[&[u8]]) -> Option<bool>) -> Result<bool, Failure> {
+/// The decision of the first line that has one.
+fn any_line(path: &Path, decide: impl Fn(&[&[u8]]) -> Option<bool>) -> Result<bool, Failure> {
     let file = File::open(path).map_err(|error| Failure::at(path, error))?;
     let mut reader = BufReader::new(file).take(HEADER_LIMIT);
     let mut line = Vec::new();
     while reader.read_until(b'\n', &mut line).map_err(|error| Failure::at(path, error))? > 0 {
         let words: Vec<&[u8]> =
             line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).collect();
-        if let Some(said) = says(&words) {
-            return Ok(said);
+        if let Some(decision) = decide(&words) {
+            return Ok(decision);
         }
         line.clear();
     }
     Ok(false)
 }
 
-/// Refuses an output that could not be written anyway, before the work for it is done.
+/// Refuses an output that could not be written, before the work for it is done.
 ///
 /// # Errors
 /// When the extension is none of a medial mesh, or the folder does not exist.
 pub fn check_output(output: Option<&Path>) -> Result<(), Failure> {
     let Some(path) = output else { return Ok(()) };
-    // Methods can take hours: a slip in a name must not show after them.
+    // Methods can take hours: a wrong name must fail before them.
     check_extension(path, &MEDIAL_MESHES)?;
     check_folder(path)
 }
@@ -91,7 +91,8 @@ pub fn check_extension(path: &Path, known: &[&str]) -> Result<(), Failure> {
         return Ok(());
     }
     let (path, known) = (path.display(), known.join(", ."));
-    Err(Failure::input(format!("{path}: the extension {extension:?} is not one of .{known}")))
+    let found = format!("found {extension:?}, expected one of .{known}");
+    Err(Failure::input(format!("{path}: unknown extension ({found})")))
 }
 
 /// Refuses a file in a folder that does not exist.
@@ -101,7 +102,7 @@ pub fn check_extension(path: &Path, known: &[&str]) -> Result<(), Failure> {
 pub fn check_folder(path: &Path) -> Result<(), Failure> {
     match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         Some(folder) if !folder.is_dir() => Err(Failure::input(format!(
-            "{}: there is no folder {}; make it first",
+            "{}: the folder does not exist; create it by `mkdir -p {}`",
             path.display(),
             folder.display()
         ))),

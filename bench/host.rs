@@ -1,8 +1,8 @@
-//! The process that the command runs in: a program of its own, or an interpreter that loaded it as a library.
+//! The process that the command runs in: its program, or an interpreter that loaded it as a library.
 //!
-//! Workers are started as the command itself was, and results belong to the code that made them. Alone, both are the
-//! running program's file; inside an interpreter that file says nothing about the methods, and does not start a worker
-//! unless it is told to.
+//! Workers are started like the command, and results carry the hash of the code that computed them. Usually both are
+//! the running program's file. Inside an interpreter, that file neither contains the methods nor starts a worker
+//! without further arguments.
 
 use std::env;
 use std::ffi::OsString;
@@ -11,14 +11,14 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// How the command is started again, and what it is made of.
+/// How to start the command again, and the file that contains its methods.
 #[derive(Clone, Debug)]
 pub struct Host {
     /// The program that is started.
     pub program: PathBuf,
     /// Its arguments before the verb.
     pub arguments: Vec<OsString>,
-    /// The file that the methods are part of: its hash tells one build from another.
+    /// The file that contains the methods: its hash identifies the build.
     pub code: PathBuf,
     /// The words of this command line, without the program's name.
     pub words: Vec<OsString>,
@@ -27,10 +27,10 @@ pub struct Host {
 static HOST: OnceLock<Host> = OnceLock::new();
 
 impl Host {
-    /// Says that the command runs inside another program, before anything else is done.
+    /// Declares that the command runs inside another program. Call it first.
     ///
     /// # Panics
-    /// When it was said, or asked, before: the command runs once in a process.
+    /// When the host is already known: the command runs once in a process.
     pub fn enter(self) {
         assert!(HOST.set(self).is_ok(), "the command runs once in a process");
     }
@@ -38,7 +38,7 @@ impl Host {
     /// The host of this process: the one that was entered, or the running program itself.
     ///
     /// # Errors
-    /// When the system does not tell which program runs.
+    /// When the path of the running program is unknown.
     pub fn here() -> io::Result<&'static Self> {
         if let Some(host) = HOST.get() {
             return Ok(host);

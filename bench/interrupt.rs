@@ -1,7 +1,7 @@
-//! What an interrupt from the keyboard or a request to end does.
+//! Interrupts from the keyboard, and requests to end.
 //!
-//! A verb that works through many items asks to be told ([`listen`]): it ends its workers, keeps
-//! what is done and says how to go on. Every other verb is ended at once.
+//! A verb with many items polls a flag ([`listen`]): it ends its workers, keeps the finished records
+//! and prints how to resume. Every other verb ends at once.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -11,15 +11,14 @@ use crate::process_tree;
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 static LISTENING: AtomicBool = AtomicBool::new(false);
 
-/// Takes over interrupts (SIGINT, SIGTERM, SIGHUP) for the rest of the process. A second one always ends
-/// it at once.
+/// Takes over interrupts (SIGINT, SIGTERM, SIGHUP) for the rest of the process. A second one always ends it at once.
 pub fn install() {
-    // Without a handler the system's own way of ending is as good.
+    // Without a handler the system ends the process, which is acceptable.
     let _ = ctrlc::set_handler(|| {
         // A flag alone: the handler interrupts other threads and must not wait for a lock.
         let again = INTERRUPTED.swap(true, Ordering::Relaxed);
         if again || !LISTENING.load(Ordering::Relaxed) {
-            // A plug-in's program would go on alone.
+            // A plug-in's program would continue.
             process_tree::end_descendants();
             medial::remove_temporaries();
             std::process::exit(Exit::Interrupted as i32);
@@ -27,7 +26,7 @@ pub fn install() {
     });
 }
 
-/// From now on an interrupt only sets the flag, which is given, until [`stop_listening`].
+/// From now on an interrupt only sets the returned flag, until [`stop_listening`].
 pub fn listen() -> &'static AtomicBool {
     LISTENING.store(true, Ordering::Relaxed);
     &INTERRUPTED

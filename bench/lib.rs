@@ -1,11 +1,12 @@
 //! The runner behind the command `medial`, and the command itself.
 //!
-//! A crate of its own gets the whole command with its methods beside the others by [`main_with`].
+//! Another crate gets the whole command, with its methods added to the built-in ones, by [`main_with`].
 //!
-//! From below: [`host`] is the process that it runs in; [`process_tree`] ends what was started; [`plugin`] makes methods of external programs; [`check`] is what
-//! every method must do; [`study`] is what to run, [`measure`] the path from an output to its record, [`store`] the folder of
-//! records, [`exec`] the workers, [`rebuild`] the report of a store; [`args`], [`exit`], [`output`], [`files`] and
-//! [`interrupt`] are what verbs share; [`cmd`] holds one file for each verb; [`cli`] lists them.
+//! The modules from low to high: [`host`], the process of the command; [`process_tree`], which ends child processes;
+//! [`plugin`], methods as external programs; [`check`], the conformance corpus; [`study`], the items to run; [`measure`],
+//! from an output to its record; [`store`], the folder of records; [`exec`], the workers; [`rebuild`], the report of a
+//! store. Verbs share [`args`], [`exit`], [`output`], [`files`] and [`interrupt`]. [`cmd`] has one file for each verb,
+//! and [`cli`] lists them.
 
 pub mod args;
 pub mod check;

@@ -13,8 +13,7 @@ use crate::args::Global;
 use crate::exit::{Exit, Failure};
 
 /// Why standard output could not be written, the first time.
-// Verbs print from many places, all of which would have to hand this up otherwise; `main` looks once,
-// at the end.
+// Verbs print from many places, all of which would have to hand this up otherwise; `main` looks once, at the end.
 static UNWRITTEN: OnceLock<io::Error> = OnceLock::new();
 
 /// The exit code of a verb that ended with `exit`: an output that could not be written is a failure.
@@ -29,10 +28,10 @@ pub fn version() -> &'static str {
     env!("CARGO_PKG_VERSION")
 }
 
-/// Prints text on standard output as it is. A closed pipe is nobody's error: who read it has enough.
+/// Prints text on standard output as it is. A closed pipe is not an error: its reader has finished.
 pub fn print_raw(text: &str) {
     let mut out = io::stdout().lock();
-    // Flushed at once: what is still buffered when the process exits would be lost without an error.
+    // Flushed at once: buffered text would be lost without an error when the process exits.
     if let Err(error) = out.write_all(text.as_bytes()).and_then(|()| out.flush())
         && error.kind() != io::ErrorKind::BrokenPipe
     {
@@ -45,7 +44,7 @@ pub fn print_line(line: &str) {
     print_raw(&(printable_lines(line) + "\n"));
 }
 
-/// Prints a line on standard error. Nobody can be told where that fails.
+/// Prints a line on standard error, and ignores failures.
 pub fn print_error(line: &str) {
     let _ = writeln!(io::stderr(), "{}", printable_lines(line));
 }

@@ -1,12 +1,12 @@
-//! The processes that a process has started, and those that these have started.
+//! Process trees: a process and all its descendants.
 //!
-//! A worker leads a session of its own and adopts the orphans among its descendants (subreaper). So
-//! everything that a method starts is a descendant of the worker while the worker lives, and all but
-//! what called `setsid` itself has the worker's session afterwards. A [`Tree`] knows its members by
-//! descent, by session, by process group, and by having been seen: exactly these are ended, and never
-//! another child of the process that watches them.
+//! A worker leads a new session and adopts the orphans among its descendants (subreaper). So every
+//! process that a method starts is a descendant of the worker while the worker lives. Afterwards it
+//! has the worker's session unless it called `setsid`. A [`Tree`] finds its members by descent, by
+//! session, by process group, and in the list of earlier members. Only these are ended, never another
+//! child of the supervisor.
 //!
-//! Without `/proc`, the process group is all that is known.
+//! Without `/proc`, only the process group is known.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -25,8 +25,8 @@ enum Signal {
     STOP,
 }
 
-/// How long processes that were killed may take to vanish.
-// One that waits for a disk ends later, and must not hold up the rest.
+/// Longest wait for killed processes to vanish.
+// A process that waits for a disk ends later, and must not hold up the rest.
 const LONGEST_END: Duration = Duration::from_secs(5);
 
 /// Whether this process adopts the orphans among its descendants: then every child is its own.
@@ -43,7 +43,7 @@ pub fn become_worker() {
     }
 }
 
-/// All descendants of a process, parents before children; none where the system does not tell.
+/// All descendants of a process, parents before children; empty on systems without `/proc`.
 pub fn descendants(pid: u32) -> Vec<u32> {
     let mut found = vec![pid];
     let mut all: Option<Vec<Stat>> = None;
@@ -68,18 +68,18 @@ pub fn resident_bytes(pid: u32) -> u64 {
     tree.filter_map(Stat::of).map(|stat| stat.resident_bytes).sum()
 }
 
-/// Ends all descendants of this process, a worker, by force. Returns the number that still ran.
+/// Kills all descendants of this process, a worker. Returns the number that still ran.
 ///
 /// Only for a process all of whose children are its own, because it reaps them too.
 pub fn end_descendants() -> usize {
     end_all(|| descendants(std::process::id()).into_iter().filter_map(Stat::of).collect())
 }
 
-/// A child of this process and all that it starts, told from everything else that runs here.
+/// A child of this process with all its descendants.
 pub struct Tree {
     root: u32,
-    /// Members met so far below the root, with their times of birth.
-    // The system uses numbers again.
+    /// Descendants of the root found so far, with their start times.
+    // The system reuses process ids.
     seen: BTreeMap<u32, u64>,
 }
 
@@ -89,9 +89,9 @@ impl Tree {
         Self { root: child.id(), seen: BTreeMap::new() }
     }
 
-    /// Resident bytes of all members that are below the root now or were once.
+    /// Resident bytes of the root and of all present and earlier descendants.
     pub fn resident_bytes(&mut self) -> u64 {
-        // A descendant that changes its session and loses its parent later is known by this list alone.
+        // Only this list has a descendant that changes its session and loses its parent later.
         for stat in descendants(self.root).into_iter().filter_map(Stat::of) {
             self.seen.insert(stat.pid, stat.born);
         }
@@ -101,9 +101,9 @@ impl Tree {
         seen.sum::<u64>() + Stat::of(self.root).map_or(0, |stat| stat.resident_bytes)
     }
 
-    /// Ends the root and all members by force, and returns the root's status.
+    /// Kills the root and all members, and returns the root's status.
     pub fn end(&mut self, root: &mut Child) -> Option<ExitStatus> {
-        // Noted while the root lives: later their descent is lost. A stopped root starts no other.
+        // Listed while the root lives: later their descent is lost. A stopped root starts no other.
         signal(self.root, Signal::STOP);
         self.resident_bytes();
         let _ = root.kill();
@@ -112,10 +112,9 @@ impl Tree {
         status
     }
 
-    /// Ends by force the members that are left after the root has ended and was waited for. Returns
-    /// the number that still ran.
+    /// Kills the remaining members after the root has ended and was waited for. Returns the number that still ran.
     pub fn end_orphans(&mut self) -> usize {
-        // Without `/proc` nothing can be listed, and the group is all there is.
+        // Without `/proc` only the process group is known.
         if Stat::of(std::process::id()).is_none() {
             kill_group(self.root);
         }
@@ -129,7 +128,7 @@ impl Tree {
             .filter(|stat| {
                 stat.group == self.root
                     || stat.session == self.root
-                    // The system gives numbers again: the time of birth tells two processes apart.
+                    // The system reuses process ids: the start time distinguishes two processes.
                     || self.seen.get(&stat.pid) == Some(&stat.born)
             })
             .map(|stat| stat.pid)
@@ -140,11 +139,11 @@ impl Tree {
     }
 }
 
-/// Kills what a listing finds until it finds nothing new, and returns the number of those that still ran.
-// Again and again, since what is killed may have started another just before.
+/// Kills the listed processes until there are no new ones, and returns the number of those that still ran.
+// Repeated, since a process may start another just before it is killed.
 fn end_all(list: impl Fn() -> Vec<Stat>) -> usize {
     let mut ended = BTreeSet::new();
-    let mut remains = BTreeSet::new();
+    let mut zombies = BTreeSet::new();
     let start = Instant::now();
     loop {
         let (over, running): (Vec<Stat>, Vec<Stat>) = list().into_iter().partition(|s| s.is_zombie);
@@ -155,14 +154,14 @@ fn end_all(list: impl Fn() -> Vec<Stat>) -> usize {
         // Reap only our own zombies.
         over.iter().filter(|stat| stat.parent == std::process::id()).for_each(|s| collect(s.pid));
         // A process that ended while the listing was made has handed its children to another parent,
-        // perhaps to one whose children were already listed: its remains ask for one more look.
-        let remains_now: BTreeSet<_> = over.iter().map(|stat| (stat.pid, stat.born)).collect();
-        let is_quiet = running.is_empty() && remains_now.is_subset(&remains);
+        // perhaps to one whose children were already listed: a new zombie requires one more listing.
+        let zombies_now: BTreeSet<_> = over.iter().map(|stat| (stat.pid, stat.born)).collect();
+        let is_quiet = running.is_empty() && zombies_now.is_subset(&zombies);
         if is_quiet || start.elapsed() > LONGEST_END {
             return ended.len();
         }
-        remains = remains_now;
-        // Killed processes need a moment to vanish; a busy loop would take it from them.
+        zombies = zombies_now;
+        // Killed processes need a moment to vanish, and a busy loop would delay them.
         thread::sleep(Duration::from_millis(1));
     }
 }
@@ -183,7 +182,7 @@ fn kill_group(leader: u32) {
     let _ = leader;
 }
 
-/// Removes what is left of a child that was adopted and has ended.
+/// Reaps an adopted child that has ended.
 fn collect(pid: u32) {
     #[cfg(unix)]
     if let Some(pid) = pid_of(pid) {
@@ -197,23 +196,23 @@ fn pid_of(pid: u32) -> Option<rustix::process::Pid> {
     rustix::process::Pid::from_raw(i32::try_from(pid).ok()?)
 }
 
-/// What a signal means to the author of a method. Numbers that are not listed differ between systems.
+/// Name and usual cause of a signal. Numbers that are not listed differ between systems.
 pub fn signal_name(signal: i32) -> String {
     let name = match signal {
         1 => "SIGHUP",
         2 => "SIGINT",
         3 => "SIGQUIT",
-        4 => "SIGILL, an illegal instruction",
+        4 => "SIGILL (illegal instruction)",
         5 => "SIGTRAP",
-        6 => "SIGABRT: it gave up by itself",
-        8 => "SIGFPE, an impossible computation",
-        9 => "SIGKILL; the system may have done so for lack of memory",
-        11 => "SIGSEGV, an access to memory that is not its own",
+        6 => "SIGABRT (aborted by itself)",
+        8 => "SIGFPE (arithmetic error)",
+        9 => "SIGKILL (possibly by the system, out of memory)",
+        11 => "SIGSEGV (invalid memory access)",
         13 => "SIGPIPE",
         14 => "SIGALRM",
         15 => "SIGTERM",
-        24 => "SIGXCPU, a limit of processor time",
-        25 => "SIGXFSZ, a limit of the size of files",
+        24 => "SIGXCPU (CPU time limit)",
+        25 => "SIGXFSZ (file size limit)",
         _ => return format!("signal {signal}"),
     };
     name.to_owned()
@@ -232,14 +231,14 @@ fn children(pid: u32) -> Option<Vec<u32>> {
     Some(children)
 }
 
-/// What the system tells of all processes.
+/// All processes; empty on systems without `/proc`.
 fn processes() -> Vec<Stat> {
     let Ok(entries) = fs::read_dir("/proc") else { return Vec::new() };
     let pids = entries.flatten().filter_map(|entry| entry.file_name().to_str()?.parse().ok());
     pids.filter_map(Stat::of).collect()
 }
 
-/// What the system tells of a process.
+/// The fields of `/proc/PID/stat` that are used.
 struct Stat {
     pid: u32,
     parent: u32,

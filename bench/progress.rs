@@ -25,16 +25,16 @@ pub enum Verbosity {
     Progress,
 }
 
-/// Progress through a known list of turns of methods: a bar on a terminal, else lines.
+/// Progress through a known list of runs of methods: a bar on a terminal, else lines.
 pub struct Progress {
     bar: Option<ProgressBar>,
     verbosity: Verbosity,
     begun: usize,
     total: usize,
     jobs: usize,
-    /// The methods of the turns that are not done.
+    /// The methods of the remaining turns.
     ahead: Vec<String>,
-    /// The methods of those that are done, with the seconds of each.
+    /// The methods of the finished turns, with the seconds of each.
     seen: Vec<(String, f64)>,
 }
 
@@ -53,7 +53,7 @@ impl Progress {
         Self { bar, verbosity, begun: 0, total: ahead.len(), jobs, ahead, seen: Vec::new() }
     }
 
-    /// Names the current mesh and method, and which of how many repetitions begins.
+    /// Shows the current mesh and method, and the number of the repetition among `of`.
     pub fn at(&mut self, mesh: &str, method: &str, [turn, of]: [usize; 2]) {
         let left = estimate(&self.seen, &self.ahead).map_or_else(String::new, |seconds| {
             let left = Duration::from_secs_f64(seconds / self.jobs as f64);
@@ -128,7 +128,7 @@ impl StageLine {
         let shown = Arc::clone(&stage);
         let line = move |state: &ProgressState, out: &mut dyn fmt::Write| {
             let stage = shown.lock().unwrap_or_else(PoisonError::into_inner);
-            // A line that could not be drawn is no reason to fail.
+            // A line that could not be drawn is not an error.
             let _ = out.write_str(&text(&stage, state.elapsed(), state.pos(), state.len()));
         };
         let style = ProgressStyle::with_template("{line}").unwrap_or(ProgressStyle::default_bar());
@@ -145,12 +145,12 @@ impl StageLine {
         self.bar.unset_length();
     }
 
-    /// Takes the steps of a method, such as for
+    /// A callback for the steps of a method, for
     /// [`RunContext::on_progress`](medial::simplifier::RunContext::on_progress).
     pub fn steps(&self) -> impl Fn(Steps) + Send + Sync + 'static {
         let bar = self.bar.clone();
         move |Steps { done, total }| {
-            // Some stages do not know how many steps there will be.
+            // Some stages have no known number of steps.
             if total > 0 && total < usize::MAX {
                 bar.set_length(total as u64);
                 bar.set_position(done as u64);

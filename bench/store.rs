@@ -1,8 +1,7 @@
 //! The folder of results: records that accumulate.
 //!
-//! `results.jsonl` is append-only: one line for each level of each item, with a key that identifies
-//! what was run. One process at a time adds to a store; its lock ends with the process, however that
-//! ends.
+//! `results.jsonl` is append-only: one line for each level of each item, with a key that identifies the
+//! run. One process at a time adds to a store; its lock ends with the process, even if that is killed.
 
 use std::collections::HashMap;
 use std::fs::{DirEntry, File, OpenOptions, TryLockError};
@@ -24,11 +23,11 @@ pub const AXES: &str = "axes";
 pub const PAGE: &str = "index.html";
 /// Name of the file that names the process that holds a store.
 const LOCK: &str = ".lock";
-/// What the text of this file begins with.
+/// The text of this file begins with this.
 const HOLDER: &str = "process ";
 /// Names in the folder itself that are written or removed.
 const FILES: [&str; 6] = [LOCK, RESULTS, PAGE, "header.json", "study.toml", "results.csv"];
-/// Names of folders in it that are this program's.
+/// Names of the folders in it that belong to this program.
 const FOLDERS: [&str; 5] = [AXES, "pictures", "plots", "tables", "views"];
 
 /// A folder of results that this process may add to.
@@ -45,7 +44,7 @@ pub struct Store {
     pub remarks: Vec<String>,
 }
 
-/// Why a folder cannot be used as a store.
+/// The reason for which a folder cannot be used as a store.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The file or folder is wrong, in use, or the file system refused.
@@ -53,7 +52,7 @@ pub enum StoreError {
     File {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong, and what to do.
+        /// Problem and advice.
         why: String,
     },
     /// A record cannot be written.
@@ -68,10 +67,10 @@ fn wrong(path: &Path, why: impl ToString) -> StoreError {
 impl Store {
     /// Opens or makes a folder of results, for `journal`, one of its lists of records.
     ///
-    /// The remains of an interrupted process are removed: temporary files, and with a remark an incomplete last line.
+    /// Removes temporary files of an interrupted process, and with a remark an incomplete last line.
     ///
     /// # Errors
-    /// When it is no folder, has other files or a link where results are written, is not writable, or another process
+    /// When it is not a folder, has other files or a link where results are written, is not writable, or another process
     /// holds it.
     pub fn open(dir: &Path, journal: &str, command: &str) -> Result<Self, StoreError> {
         let entries = entries_of(dir);
@@ -81,7 +80,7 @@ impl Store {
         let lock = lock(dir, command)?;
         let path = dir.join(journal);
         let (known, remarks) = read_known(&path).map_err(io_error(&path))?;
-        // The remains of an ended process. The lock is held, so none is in use.
+        // Temporary files of an ended process. The lock is held, so none is in use.
         for entry in entries.iter().filter(|entry| is_temporary(entry)) {
             let _ = fs::remove_file(entry.path());
         }
@@ -102,7 +101,7 @@ impl Store {
     pub fn clear(&mut self, journal: &str) -> Result<(), StoreError> {
         let artifacts = self.known.values().filter_map(|record| record.artifact.as_deref());
         for path in artifacts.filter_map(|artifact| artifact_path(&self.dir, artifact)) {
-            // A file that stays does not count as a result, without a record.
+            // A remaining file without a record does not count as a result.
             let _ = fs::remove_file(&path);
             // Succeeds for a folder that is empty now.
             let _ = path.parent().map(fs::remove_dir);
@@ -116,8 +115,8 @@ impl Store {
         Ok(())
     }
 
-    /// The levels of an item that have to be run: levels without a record or whose medial mesh is missing, levels that were
-    /// ended by a limit or skipped by a budget that is larger now, and failed or skipped ones if these are to be retried.
+    /// The levels of an item to run: levels without a record or without their medial mesh, levels that a limit ended or
+    /// a budget skipped if it is larger now, and failed or skipped levels with `retry_failed`.
     pub fn missing(&self, item: &Item, retry_failed: bool) -> Vec<Target> {
         (item.levels.iter().zip(item.keys()))
             .filter(|(_, key)| {
@@ -130,7 +129,7 @@ impl Store {
             .collect()
     }
 
-    /// Whether a medial mesh that is to stay is gone, or was not kept when it was made.
+    /// Whether a medial mesh that has to be on disk is missing there.
     fn lacks_mesh(&self, record: &Record, item: &Item) -> bool {
         let is_there = |name| artifact_path(&self.dir, name).is_some_and(|path| path.is_file());
         match (&record.artifact, record.simplify.spheres) {
@@ -144,7 +143,7 @@ impl Store {
     ///
     /// # Errors
     /// When they cannot be written.
-    pub fn keep(&mut self, records: &[Record]) -> Result<(), StoreError> {
+    pub fn append(&mut self, records: &[Record]) -> Result<(), StoreError> {
         self.added += records.len();
         Ok(self.journal.append_lines(records)?)
     }
@@ -154,7 +153,7 @@ impl Store {
 fn is_incomplete(record: &Record, item: &Item, retry_failed: bool) -> bool {
     let limits = record.conditions.clone().unwrap_or_default();
     match record.status {
-        // A result that came in time is the same under any limit; one that did not may come under a larger one.
+        // A finished result is the same under any limit; an interrupted one may finish under a larger limit.
         Status::TimedOut if item.limits.seconds > limits.seconds_limit => true,
         Status::OutOfMemory if item.limits.bytes > limits.bytes_limit => true,
         Status::Skipped if item.limits.budget.is_none_or(|budget| Some(budget) > limits.budget) => {
@@ -177,41 +176,41 @@ pub fn is_store(dir: &Path, journal: &str) -> bool {
     is_ours || dir.join(journal).exists()
 }
 
-/// Refuses a folder that is not this program's and not empty, and one in which a link or a device stands at one of the
-/// `entries` where this program writes or removes. The folder itself may be a link.
+/// Refuses a folder with other files, and a folder with a link or a device among its `entries`, which this program
+/// writes or removes. The folder itself may be a link.
 ///
 /// # Errors
-/// [`StoreError::File`], which names what is there.
+/// [`StoreError::File`], which names the folder or entry.
 pub fn claim(dir: &Path, is_ours: bool, entries: &[DirEntry]) -> Result<(), StoreError> {
     if dir.exists() && !dir.is_dir() {
         return Err(wrong(dir, "not a folder"));
     }
     // Requests to workers are JSON, which has no other text.
     if dir.to_str().is_none() {
-        return Err(wrong(dir, "the name is not UTF-8; take another with --out"));
+        return Err(wrong(dir, "the name is not UTF-8; choose another by --out"));
     }
     if !is_ours && listed(dir).next().is_some() {
-        let why = "neither empty nor a folder of results; take another with --out";
+        let why = "neither empty nor a folder of results; choose another by --out";
         return Err(wrong(dir, why));
     }
     for entry in entries {
         let kind = entry.file_type().map_err(io_error(&entry.path()))?;
         if !kind.is_file() && !kind.is_dir() {
-            let why = "a link or not a regular file, where results are written; remove it, or take \
-                       another folder with --out";
+            let why = "not a regular file, but results are written here; remove it, or choose \
+                       another folder by --out";
             return Err(wrong(&entry.path(), why));
         }
     }
     Ok(())
 }
 
-/// What a folder holds; nothing where it cannot be listed.
+/// The entries of a folder; none where it cannot be listed.
 pub fn listed(dir: impl AsRef<Path>) -> impl Iterator<Item = DirEntry> {
     fs::read_dir(dir).into_iter().flatten().flatten()
 }
 
-/// The entries of a store that are this program's, by their names or by the folders that they lie in; what else the
-/// folder holds belongs to the user. The folders come before their contents.
+/// The entries of a store that belong to this program, by their names or by their folders. All other entries belong to
+/// the user. Folders come before their contents.
 fn entries_of(dir: &Path) -> Vec<DirEntry> {
     let is_named = |entry: &DirEntry| {
         let name = entry.file_name();
@@ -224,14 +223,14 @@ fn entries_of(dir: &Path) -> Vec<DirEntry> {
     entries
 }
 
-/// Whether this program left it behind in the middle of a write.
+/// Whether it is a temporary file of an interrupted write.
 fn is_temporary(entry: &DirEntry) -> bool {
     let name = entry.file_name();
     let name = name.to_string_lossy();
     name.starts_with(".medial-") && name.ends_with(".tmp")
 }
 
-/// Takes the lock and writes down who holds it.
+/// Takes the lock and writes the process id and the command into it.
 fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
     let path = dir.join(LOCK);
     let mut options = OpenOptions::new();
@@ -244,7 +243,7 @@ fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
             let mut holder = String::new();
             let _ = file.read_to_string(&mut holder);
             let holder = if holder.is_empty() { "another process" } else { &holder };
-            let why = "is adding results to this folder; wait for it, or take another with --out";
+            let why = "is adding results to this folder; wait for it, or choose another by --out";
             return Err(wrong(dir, format!("{holder} {why}")));
         }
         // Some file systems have no locks; two runs into one folder go unnoticed there.
@@ -261,7 +260,7 @@ fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
     Ok(file)
 }
 
-/// The last record of each key, and remarks on lines that hold no record: an incomplete last line is cut off, others stay
+/// The last record of each key, and remarks on lines without a record: an incomplete last line is removed, others stay
 /// and do not count.
 fn read_known(path: &Path) -> io::Result<(HashMap<String, Record>, Vec<String>)> {
     let bytes = match check_regular(path).and_then(|()| fs::read(path)) {
@@ -274,15 +273,15 @@ fn read_known(path: &Path) -> io::Result<(HashMap<String, Record>, Vec<String>)>
     if is_torn {
         OpenOptions::new().write(true).open(path)?.set_len(whole as u64)?;
         remarks.push(format!(
-            "{name}: its last line was incomplete, the trace of a process that was ended while it wrote; it was removed, \
-             and its item is run again"
+            "{name}: removed an incomplete last line left by an interrupted run; its item runs again"
         ));
     }
     let journaled = parse_records(if is_torn { &bytes[..whole] } else { &bytes });
     if let Some(first) = journaled.bad_lines.first() {
         let count = journaled.bad_lines.len();
+        let all = count + journaled.records.len();
         remarks.push(format!(
-            "{name}: lines without a record, whose items run again: {count}; {first}"
+            "{name}: {count} of {all} lines have no record; their items run again; {first}"
         ));
     }
     // Lines are only added: the last one of a key replaces the earlier.
@@ -305,7 +304,7 @@ fn remove(path: &Path) -> Result<(), StoreError> {
     }
 }
 
-/// An error of the file system with the path that it is about.
+/// Adds the path to an error of the file system.
 fn io_error(path: &Path) -> impl Fn(io::Error) -> StoreError {
     let path = path.to_owned();
     move |error| wrong(&path, error)

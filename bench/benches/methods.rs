@@ -1,8 +1,8 @@
-//! Every registered method on two built-in shapes at three sizes: preparation and one level from it, without the substrates that
-//! methods share. The initial medial mesh, which is one of these, by itself; and what a hierarchy is asked for.
+//! Every registered method on two built-in shapes at three sizes: preparation and one level, without the shared
+//! substrates. Separately the initial medial mesh, which is one of these, and queries of a hierarchy.
 //!
-//! A new method appears here by being registered. `tight` takes seconds for each result: it runs at the smallest size
-//! alone, with fewer samples and rounds than its own.
+//! Every registered method appears here. `tight` takes seconds for each result: it runs only at the smallest size, with
+//! fewer samples and rounds than by default.
 
 mod plan;
 
@@ -14,7 +14,7 @@ use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext};
 use medial_bench::study::source::{Input, Source};
 
-/// Spheres that each method is asked for.
+/// Requested number of spheres.
 const SPHERES: usize = 100;
 
 /// Shapes and their resolutions: one smooth and round, one of flat sheets with sharp edges, whose samples are degenerate.

@@ -1,4 +1,4 @@
-//! The demands of the corpus in the order of [`super::cases`], then the shapes that they are about.
+//! The demands of the corpus in the order of [`super::cases`], then their shapes.
 
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -11,17 +11,17 @@ use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, RunContext, Simplification, Simplified, SimplifyError};
 use medial::surface::{self, TriMesh};
 
-use super::{Answer, Outcome, Subject, failed, miss};
+use super::{CaseResult, Outcome, Subject, failed, miss};
 use crate::plugin::is_id;
 
 /// A name that no parameter has.
 const UNKNOWN: &str = "no_such_parameter";
 
 /// A description that tables and command lines can use.
-pub(super) fn description(subject: &Subject<'_>) -> Answer {
+pub(super) fn description(subject: &Subject<'_>) -> CaseResult {
     let info = subject.method.info();
     if !is_id(&info.id) {
-        return failed(format!("the id `{}`: use lower-case letters, digits and hyphens", info.id));
+        return failed(format!("id `{}`: expected lower-case letters, digits, hyphens", info.id));
     }
     if info.title.trim().is_empty() {
         return failed("it has no title");
@@ -34,7 +34,7 @@ pub(super) fn description(subject: &Subject<'_>) -> Answer {
             return failed(format!("the parameter `{}` has no unit; write `none`", param.name));
         }
         if info.params[..place].iter().any(|other| other.name == param.name) {
-            return failed(format!("two parameters are called `{}`", param.name));
+            return failed(format!("two parameters have the name `{}`", param.name));
         }
     }
     // Exception: a method that is being written has no paper yet.
@@ -43,46 +43,46 @@ pub(super) fn description(subject: &Subject<'_>) -> Answer {
 }
 
 /// A misspelt parameter must not run with the default.
-pub(super) fn unknown_parameter(subject: &Subject<'_>) -> Answer {
+pub(super) fn unknown_parameter(subject: &Subject<'_>) -> CaseResult {
     let shape = corpus_shape("sphere");
     let mut params = subject.params.clone();
     params.set(UNKNOWN, "1");
     (subject.doing)("preparing with an unknown parameter");
     match subject.method.prepare(&shape, &params, &RunContext::default()) {
         Err(SimplifyError::Parameter(_)) => Ok(vec![]),
-        Err(error) => failed(format!("`{UNKNOWN}` is no wrong `Parameter` to it, but {error}")),
-        Ok(_) => failed(format!("it takes a parameter `{UNKNOWN}`, which it does not have")),
+        Err(error) => failed(format!("`{UNKNOWN}`: expected `Parameter`, found: {error}")),
+        Ok(_) => failed(format!("it accepts the unknown parameter `{UNKNOWN}`")),
     }
 }
 
-/// Defaults spelt out, and left out.
-pub(super) fn defaults(subject: &Subject<'_>) -> Answer {
+/// The documented defaults are those of the method.
+pub(super) fn defaults(subject: &Subject<'_>) -> CaseResult {
     let shape = corpus_shape("sphere");
     let mut params = subject.params.clone();
     for param in &subject.method.info().params {
-        // What the user sets is not the default.
+        // A value of the user is not the default.
         if !params.0.contains_key(&*param.name) {
             params.set(&param.name, &param.default);
         }
     }
     let spelt = Subject { params: &params, ..*subject };
     let (plain, spelt) = (subject.mesh(&shape.view(), 50)?, spelt.mesh(&shape.view(), 50)?);
-    same(&plain, &spelt, 0.0, "its documented defaults are not those it runs with")
+    same(&plain, &spelt, 0.0, "its documented defaults change the result")
 }
 
-/// Numbers of spheres, from fine to coarse, down to the least that can be asked.
+/// Numbers of spheres, from fine to coarse, down to 1.
 pub(super) const COUNTS: [usize; 4] = [400, 100, 20, 1];
 
 /// A sphere that reaches farther, in diagonals of the surface, is of another shape or in other units.
 const FARTHEST: f64 = 1e12;
 
-/// Why a result is none: not a valid complex, empty, far outside, or the answer to another question.
+/// Refuses a result that is not a valid complex, is empty, far outside, or of another level.
 pub(super) fn sound(result: &Simplified, level: Level) -> Result<(), String> {
     result.mesh.check().map_err(|error| format!("the medial mesh is not valid: {error}"))?;
     if result.mesh.spheres.is_empty() {
         return Err("the medial mesh has no sphere".into());
     }
-    // Larger ones pass every test of validity, and spoil every measure.
+    // Larger spheres pass every test of validity, and spoil every metric.
     for (id, sphere) in result.mesh.spheres.iter().enumerate() {
         let reach = sphere.centre.abs().max_element().max(sphere.radius);
         if reach > FARTHEST {
@@ -90,34 +90,35 @@ pub(super) fn sound(result: &Simplified, level: Level) -> Result<(), String> {
         }
     }
     // Published numbers could be compared with those of another level otherwise.
-    if result.asked != level {
-        return Err(format!("the result says that {} was asked", result.asked));
+    let requested = result.asked;
+    if requested != level {
+        return Err(format!("another level (found {requested}, expected {level})"));
     }
     Ok(())
 }
 
 /// Sound results on an ordinary solid.
-pub(super) fn valid_on(subject: &Subject<'_>, name: &str) -> Answer {
+pub(super) fn valid_on(subject: &Subject<'_>, name: &str) -> CaseResult {
     let shape = corpus_shape(name);
     let mut simplification = subject.prepare(&shape)?;
-    // Asking once decides what kind of level the method takes.
+    // One call decides which kind of level the method takes.
     if subject.level(simplification.as_mut(), COUNTS[0])? == Level::Published {
-        subject.ask(simplification.as_mut(), &shape, Level::Published)?;
-        return Ok(vec!["at its published level: it is not asked for numbers".into()]);
+        subject.at(simplification.as_mut(), &shape, Level::Published)?;
+        return Ok(vec!["at its published level: it has no sphere counts".into()]);
     }
     // Prepared again: the level above may have left a coarse state.
     let mut simplification = subject.prepare(&shape)?;
     for count in COUNTS {
-        subject.ask(simplification.as_mut(), &shape, Level::Spheres(count))?;
+        subject.at(simplification.as_mut(), &shape, Level::Spheres(count))?;
     }
     Ok(vec![])
 }
 
-/// Sound results on a solid that is at the edge of what can be resolved.
+/// Sound results on a solid at the limit of resolution.
 ///
-/// Exception: it may be refused in words, also by the name of the parameter that would resolve it. A
-/// panic, a crash, an invalid or an empty result is no refusal.
-pub(super) fn valid_or_refused(subject: &Subject<'_>, name: &str) -> Answer {
+/// Exception: it may be refused by an error, also one about the parameter that would resolve it. A
+/// panic, a crash, an invalid or an empty result is not a refusal.
+pub(super) fn valid_or_refused(subject: &Subject<'_>, name: &str) -> CaseResult {
     let shape = corpus_shape(name);
     (subject.doing)(&format!("preparing the {name}"));
     let prepared = subject.method.prepare(&shape, subject.params, &Default::default());
@@ -134,7 +135,7 @@ pub(super) fn valid_or_refused(subject: &Subject<'_>, name: &str) -> Answer {
             Ok(result) => {
                 sound(&result, level).map_err(|why| Outcome::Failed(format!("{place}: {why}")))?;
             }
-            // One remark is enough: the others are alike.
+            // One remark is enough: the others are similar.
             Err(error) if remarks.is_empty() => remarks = refusal(&place, &error)?,
             Err(error) => drop(refusal(&place, &error)?),
         }
@@ -142,8 +143,8 @@ pub(super) fn valid_or_refused(subject: &Subject<'_>, name: &str) -> Answer {
     Ok(remarks)
 }
 
-/// That a solid is refused, where the error says so in words.
-fn refusal(place: &str, error: &SimplifyError) -> Answer {
+/// A remark on a refusal; other errors fail the case.
+fn refusal(place: &str, error: &SimplifyError) -> CaseResult {
     match error {
         SimplifyError::Unsupported { .. }
         | SimplifyError::Shape(_)
@@ -157,14 +158,14 @@ fn refusal(place: &str, error: &SimplifyError) -> Answer {
 /// Shapes that differ in kind: thin, round, looped, hollow, sharp.
 const SHAPES: [&str; 6] = ["sphere", "box", "capsule", "torus", "hollow-sphere", "bracket"];
 
-/// A result with so much more or less than was asked is one at another count.
+/// Largest relative difference between the requested and the reached count.
 const TOLERANCE: f64 = 0.02;
 
 /// No medial mesh here has as many spheres.
 const HUGE: usize = 1_000_000_000;
 
-/// The count is reached, or a warning says why not.
-pub(super) fn counts_met(subject: &Subject<'_>) -> Answer {
+/// The count is reached, or a warning has the reason.
+pub(super) fn counts_met(subject: &Subject<'_>) -> CaseResult {
     for name in SHAPES {
         let shape = corpus_shape(name);
         let view = shape.view();
@@ -176,15 +177,15 @@ pub(super) fn counts_met(subject: &Subject<'_>) -> Answer {
     Ok(vec![])
 }
 
-/// More than there is, by one sphere and by many.
-pub(super) fn counts_above(subject: &Subject<'_>) -> Answer {
+/// Counts above the number of initial spheres, by one and by many.
+pub(super) fn counts_above(subject: &Subject<'_>) -> CaseResult {
     for name in ["capsule", TETRAHEDRON] {
         let shape = corpus_shape(name);
         let initial = shape.view().initial().map_or(1, |mesh| mesh.spheres.len());
         let view = shape.view();
         let mut simplification = match subject.prepare(&view) {
             Ok(simplification) => simplification,
-            // Exception: a solid of four vertices may be refused; the case about it says how.
+            // Exception: a solid of four vertices may be refused; another case checks this.
             Err(_) if name == TETRAHEDRON => continue,
             Err(miss) => return Err(miss),
         };
@@ -192,7 +193,7 @@ pub(super) fn counts_above(subject: &Subject<'_>) -> Answer {
         if name == TETRAHEDRON && one.is_err() {
             continue;
         }
-        // First the absurd one: a method that allocates by the request fails here.
+        // First the huge count: a method that allocates by the request fails here.
         for count in [HUGE, initial + 1] {
             at_count(subject, simplification.as_mut(), &shape, count)?;
         }
@@ -200,17 +201,17 @@ pub(super) fn counts_above(subject: &Subject<'_>) -> Answer {
     Ok(vec![])
 }
 
-/// No sphere at all is refused, by name.
-pub(super) fn no_spheres(subject: &Subject<'_>) -> Answer {
+/// A count of 0 is refused with the right kind of error.
+pub(super) fn no_spheres(subject: &Subject<'_>) -> CaseResult {
     let shape = corpus_shape("sphere");
     let mut simplification = subject.prepare(&shape)?;
-    (subject.doing)("asking for 0 spheres");
+    (subject.doing)("trying 0 spheres");
     match simplification.at(Level::Spheres(0)) {
         Err(SimplifyError::Level(_) | SimplifyError::Unsupported { .. }) => Ok(vec![]),
-        Err(error) => failed(format!("0 spheres are no `Level` to it, but {error}")),
+        Err(error) => failed(format!("0 spheres: expected `Level`, found: {error}")),
         Ok(result) => {
             let spheres = result.mesh.spheres.len();
-            failed(format!("0 spheres were asked, and {spheres} given: refuse that as a `Level`"))
+            failed(format!("0 spheres: expected `Level`, found {spheres} spheres"))
         }
     }
 }
@@ -221,7 +222,7 @@ fn at_count(
     shape: &Shape,
     count: usize,
 ) -> Result<Simplified, Outcome> {
-    let result = subject.ask(simplification, shape, Level::Spheres(count))?;
+    let result = subject.at(simplification, shape, Level::Spheres(count))?;
     let reached = result.mesh.spheres.len();
     let near = reached.abs_diff(count) as f64 <= TOLERANCE * count as f64;
     if near || !result.diagnostics.warnings.is_empty() {
@@ -233,21 +234,21 @@ fn at_count(
         return Ok(result);
     }
     failed(format!(
-        "{count} spheres of the {}: it gives {reached}, and no warning says why",
+        "{count} spheres of the {}: found {reached} spheres without a warning",
         shape.name()
     ))
 }
 
-/// The method's own level: senseless values are refused, the one that it names is taken.
-pub(super) fn native_level(subject: &Subject<'_>) -> Answer {
+/// Native levels: invalid values are refused, and the value of a result is accepted.
+pub(super) fn native_level(subject: &Subject<'_>) -> CaseResult {
     let shape = corpus_shape("capsule");
     let mut simplification = subject.prepare(&shape)?;
     if subject.method.info().native.is_none() {
-        (subject.doing)("asking for level 1 of its own");
+        (subject.doing)("trying native level 1");
         return match simplification.at(Level::Native(1.0)) {
             Err(SimplifyError::Unsupported { .. }) => Ok(vec![]),
-            Err(error) => failed(format!("a level of its own, which it has not: {error}")),
-            Ok(_) => failed("it answers a level of its own, but its description has none"),
+            Err(error) => failed(format!("native level: expected `Unsupported`, found: {error}")),
+            Ok(_) => failed("it accepts a native level, but its description has none"),
         };
     }
     // -1 is finite, and below the range of every level that a paper has.
@@ -256,32 +257,35 @@ pub(super) fn native_level(subject: &Subject<'_>) -> Answer {
         (subject.doing)(&level.to_string());
         match simplification.at(level) {
             Err(SimplifyError::Level(_) | SimplifyError::Unsupported { .. }) => {}
-            // Exception: only the program itself knows the range of its level, and says so by its
-            // exit code.
+            // Exception: only the program itself has the range of its level, and refuses by its exit code.
             Err(SimplifyError::Failed(_)) if subject.external && value == -1.0 => {}
-            Err(error) => return failed(format!("{level} is no `Level` to it, but {error}")),
-            Ok(_) => return failed(format!("it answers {level}: refuse that as a `Level`")),
+            Err(error) => return failed(format!("{level}: expected `Level`, found: {error}")),
+            Ok(_) => return failed(format!("{level}: expected `Level`, found a result")),
         }
     }
     let near = subject.level(simplification.as_mut(), 20)?;
-    let used = subject.ask(simplification.as_mut(), &shape, near)?.native_level;
+    let used = subject.at(simplification.as_mut(), &shape, near)?.native_level;
     let Some(value) = used else {
-        return Ok(vec!["its results do not say which native level was used".into()]);
+        return Ok(vec!["its results have no native level".into()]);
     };
-    taken(subject, simplification.as_mut(), Level::Native(value))
+    accepted(subject, simplification.as_mut(), Level::Native(value))
 }
 
-/// A level that the method has named itself.
+/// A native level from a result of the method.
 // It need not lead to the same result: a number of spheres can divide those that tie for a level, and
 // a bound may be held for the whole only.
-fn taken(subject: &Subject<'_>, simplification: &mut dyn Simplification, level: Level) -> Answer {
+fn accepted(
+    subject: &Subject<'_>,
+    simplification: &mut dyn Simplification,
+    level: Level,
+) -> CaseResult {
     (subject.doing)(&level.to_string());
     match simplification.at(level) {
         // Exception: the bound of a number of spheres may be below what can be held.
-        Err(SimplifyError::Level(why)) => Ok(vec![format!("{level}, its own, is refused: {why}")]),
-        Err(error) => failed(format!("{level}, which it has named itself: {error}")),
+        Err(SimplifyError::Level(why)) => Ok(vec![format!("refused its {level}: {why}")]),
+        Err(error) => failed(format!("{level} of a result: {error}")),
         Ok(result) => {
-            // Exception: where all tie, none is beyond the level. It has to be said.
+            // Exception: where all spheres tie, none is beyond the level. A warning is required.
             if result.mesh.spheres.is_empty() && !result.diagnostics.warnings.is_empty() {
                 return Ok(vec![]);
             }
@@ -291,60 +295,60 @@ fn taken(subject: &Subject<'_>, simplification: &mut dyn Simplification, level: 
     }
 }
 
-/// The published level, which not every paper has.
-pub(super) fn published_level(subject: &Subject<'_>) -> Answer {
+/// The published level, which is optional.
+pub(super) fn published_level(subject: &Subject<'_>) -> CaseResult {
     let shape = corpus_shape("capsule");
     let mut simplification = subject.prepare(&shape)?;
-    (subject.doing)("asking for the published level");
+    (subject.doing)("trying the published level");
     match simplification.at(Level::Published) {
         Err(SimplifyError::Unsupported { why }) if why.trim().is_empty() => {
-            failed("its published level is unsupported, and it does not say why")
+            failed("its published level is unsupported without a reason")
         }
         Err(SimplifyError::Unsupported { why }) => Ok(vec![format!("unsupported: {why}")]),
         _ => {
-            subject.ask(simplification.as_mut(), &shape, Level::Published)?;
+            subject.at(simplification.as_mut(), &shape, Level::Published)?;
             Ok(vec![])
         }
     }
 }
 
-// A program's files hold the input's units: what it reads is rounded otherwise in others.
+// The files of a program have the input's units, and other units round differently.
 const ROUNDING: f64 = 1e-9;
 
-/// A level is the same whatever was computed before it: finer, coarser, and the same again.
-pub(super) fn continuing(subject: &Subject<'_>) -> Answer {
+/// A level has the same result after finer, coarser and equal levels.
+pub(super) fn continuing(subject: &Subject<'_>) -> CaseResult {
     let shape = corpus_shape("torus");
     let view = shape.view();
     let mut simplification = subject.prepare(&view)?;
-    // Down, up and down to one that was there: caches that are not reset show.
+    // Down, up and down to an earlier level: shows caches that are not reset.
     for count in [300, 100, 200, 100] {
         let level = Level::Spheres(count);
-        let continued = subject.ask(simplification.as_mut(), &view, level)?;
-        let alone = subject.ask(subject.prepare(&shape.view())?.as_mut(), &shape, level)?;
+        let continued = subject.at(simplification.as_mut(), &view, level)?;
+        let alone = subject.at(subject.prepare(&shape.view())?.as_mut(), &shape, level)?;
         if let Some(difference) = difference(&alone.mesh, &continued.mesh, 0.0) {
             return failed(format!(
-                "{level} of the torus after other levels differ from those alone: {difference}"
+                "{level} of the torus: another result after other levels: {difference}"
             ));
         }
     }
     Ok(vec![])
 }
 
-/// The whole way twice, with nothing shared.
-pub(super) fn repeated(subject: &Subject<'_>) -> Answer {
+/// Two complete runs without shared state.
+pub(super) fn repeated(subject: &Subject<'_>) -> CaseResult {
     let first = subject.mesh(&corpus_shape("bracket"), 150)?;
     let second = subject.mesh(&corpus_shape("bracket"), 150)?;
-    same(&first, &second, 0.0, "a second run of the bracket gives another medial mesh")
+    same(&first, &second, 0.0, "the bracket: another result in a second run")
 }
 
 /// Other numbers of threads, for substrates and method alike.
-pub(super) fn threads(subject: &Subject<'_>) -> Answer {
+pub(super) fn threads(subject: &Subject<'_>) -> CaseResult {
     let mut results: Vec<MedialMesh> = Vec::new();
     // 5 divides no power of two: chunks end elsewhere.
     for threads in [1, 2, 5] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|error| Outcome::Skipped(error.to_string()))?;
-        // What the caller is told stays in this thread: the method runs in the pool.
+        // The callback stays in this thread: the method runs in the pool.
         (subject.doing)(&format!("150 spheres of the bracket with {threads} threads"));
         let (method, params) = (subject.method, subject.params);
         let result = pool.install(|| {
@@ -357,26 +361,26 @@ pub(super) fn threads(subject: &Subject<'_>) -> Answer {
         });
         let place = format!("the bracket with {threads} threads");
         results.push(result.map_err(|error| miss(&place, &error))?.mesh);
-        let changed = format!("{place} gives another medial mesh");
+        let changed = format!("{place}: another result");
         same(&results[0], &results[results.len() - 1], 0.0, &changed)?;
     }
     Ok(vec![])
 }
 
 /// Powers of two, so that normalised coordinates are the same bits.
-pub(super) fn scale(subject: &Subject<'_>) -> Answer {
+pub(super) fn scale(subject: &Subject<'_>) -> CaseResult {
     let plain = subject.mesh(&corpus_shape("capsule"), 100)?;
     for scale in [1.0 / 1024.0, 4096.0] {
         let result = subject.mesh(&scaled_shape("capsule", scale), 100)?;
-        // Exception: a program is given the units of the input, and its arithmetic is its own.
+        // Exception: a program gets the units of the input and may use any arithmetic.
         let tolerance = if subject.external { ROUNDING } else { 0.0 };
-        let changed = format!("{scale} times the capsule gives another medial mesh");
+        let changed = format!("{scale} times the capsule: another result");
         same(&plain, &result, tolerance, &changed)?;
     }
     Ok(vec![])
 }
 
-fn same(first: &MedialMesh, second: &MedialMesh, tolerance: f64, otherwise: &str) -> Answer {
+fn same(first: &MedialMesh, second: &MedialMesh, tolerance: f64, otherwise: &str) -> CaseResult {
     match difference(first, second, tolerance) {
         None => Ok(vec![]),
         Some(difference) => failed(format!("{otherwise}: {difference}")),
@@ -412,24 +416,24 @@ pub(super) fn difference(
     (!contacts).then(|| "all is the same but the contact points".into())
 }
 
-/// So long after the flag was set a person still waits.
+/// Longest time to end after a cancellation.
 const SOON: Duration = Duration::from_secs(10);
-/// Methods are at work by then, or done.
+/// After this time, methods are running or done.
 const AT_WORK: Duration = Duration::from_millis(50);
 
-/// The flag is set before anything is asked.
-pub(super) fn cancelled_before(subject: &Subject<'_>) -> Answer {
+/// Cancelled before the first level.
+pub(super) fn cancelled_before(subject: &Subject<'_>) -> CaseResult {
     cancelled(subject, Duration::ZERO)
 }
 
-/// The flag is set while the method works.
-pub(super) fn cancelled_within(subject: &Subject<'_>) -> Answer {
+/// Cancelled while the method runs.
+pub(super) fn cancelled_within(subject: &Subject<'_>) -> CaseResult {
     cancelled(subject, AT_WORK)
 }
 
-fn cancelled(subject: &Subject<'_>, delay: Duration) -> Answer {
+fn cancelled(subject: &Subject<'_>, delay: Duration) -> CaseResult {
     let shape = corpus_shape("bracket");
-    // Substrates are nobody's method, and take what they take.
+    // Substrates are not part of the method, and their time does not count.
     let _ = shape.view().initial();
     let context = RunContext::default();
     let flag = context.cancel_flag();
@@ -448,10 +452,10 @@ fn cancelled(subject: &Subject<'_>, delay: Duration) -> Answer {
     if late > SOON {
         return failed(format!("it ended {:.0} s after it was cancelled", late.as_secs_f64()));
     }
-    // Exception: a method that is quick enough may give its result all the same.
+    // Exception: a quick method may return its result.
     match outcome {
         Ok(()) | Err(SimplifyError::Cancelled | SimplifyError::Unsupported { .. }) => Ok(vec![]),
-        Err(error) => failed(format!("a cancelled run is not `Cancelled`, but {error}")),
+        Err(error) => failed(format!("expected `Cancelled`, found: {error}")),
     }
 }
 
@@ -470,7 +474,7 @@ fn run_two_levels(
 }
 
 /// A plain medial mesh, as a file holds it: without contact points.
-pub(super) fn given_initial(subject: &Subject<'_>) -> Answer {
+pub(super) fn given_initial(subject: &Subject<'_>) -> CaseResult {
     let shape = corpus_shape("capsule");
     let initial = shape.view().initial().map_err(|error| Outcome::Skipped(error.to_string()))?;
     let plain = MedialMesh { contacts: None, ..(*initial).clone() };
@@ -479,16 +483,16 @@ pub(super) fn given_initial(subject: &Subject<'_>) -> Answer {
     let shape = corpus_shape("capsule").with_initial(&plain);
     let level = Level::Spheres(50);
     (subject.doing)("50 spheres from a given medial mesh of the capsule");
-    let answer = subject
+    let result = subject
         .method
         .prepare(&shape, subject.params, &Default::default())
         .and_then(|mut simplification| simplification.at(level));
-    match answer {
+    match result {
         Ok(result) => {
             sound(&result, level).map_err(Outcome::Failed)?;
             Ok(vec![])
         }
-        // Exception: what a method needs beside a medial mesh, it may say.
+        // Exception: a method may require more than a medial mesh.
         Err(SimplifyError::Unsupported { why }) => Ok(vec![format!("unsupported: {why}")]),
         Err(error) => Err(Outcome::Failed(format!("from a given medial mesh: {error}"))),
     }
@@ -561,7 +565,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_shapes_made_here_are_what_they_are_called() {
+    fn generated_shapes_match_their_names() {
         for (name, components, vertices) in
             [(PARTS, 2, None), (PLATE, 1, None), (TETRAHEDRON, 1, Some(4)), (CUBE, 1, Some(8))]
         {

@@ -1,9 +1,8 @@
-//! One corpus for every method: what each must do, whatever it is and wherever it comes from.
+//! One conformance corpus for every method, built in or external.
 //!
-//! A [`Case`] is a function of a [`Subject`]: a method with its parameters. It knows neither
-//! processes nor limits; the runner gives it a worker of its own, so that a case that panics, hangs
-//! or takes all memory is one that failed. What the contract leaves open is a commented exception
-//! beside the demand.
+//! A [`Case`] is a function of a [`Subject`]: a method with its parameters. It is independent of
+//! processes and limits. The runner starts it in a separate worker, so that a case that panics, hangs
+//! or takes all memory fails. Where the contract is open, the demand has a commented exception.
 
 use medial::complex::MedialMesh;
 use medial::shape::Shape;
@@ -20,9 +19,9 @@ use demands::*;
 pub struct Case {
     /// Name, for `--case`.
     pub name: &'static str,
-    /// What it demands, as a sentence without a subject.
+    /// The demand, as a sentence without a subject.
     pub demands: &'static str,
-    run: fn(&Subject<'_>) -> Answer,
+    run: fn(&Subject<'_>) -> CaseResult,
 }
 
 /// A method under test.
@@ -31,70 +30,70 @@ pub struct Subject<'a> {
     pub method: &'a dyn MedialSimplifier,
     /// Its parameters.
     pub params: &'a Params,
-    /// Whether it is a program of its own.
+    /// Whether it is an external program.
     pub external: bool,
-    /// Is told what the method is asked next, so that whoever has to end it knows at what it was.
+    /// Gets each step before it starts, for the message about a method that has to be killed.
     pub doing: &'a dyn Fn(&str),
 }
 
-/// How a case ended.
+/// The outcome of a case.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// The method does what is demanded; with what a reader may want to know.
+    /// The method meets the demand, with remarks.
     Passed(Vec<String>),
-    /// It does not: why.
+    /// The method does not meet the demand, with the reason.
     Failed(String),
-    /// The demand does not apply to it: why.
+    /// The demand does not apply to the method, with the reason.
     Skipped(String),
 }
 
-/// What a case gives: remarks, or an outcome other than [`Outcome::Passed`].
-type Answer = Result<Vec<String>, Outcome>;
+/// Remarks of a case, or an outcome other than [`Outcome::Passed`].
+type CaseResult = Result<Vec<String>, Outcome>;
 
-/// All cases, in the order in which they are run: what is said first, what takes long last.
+/// All cases in the order of their runs, slow ones last.
 pub fn cases() -> &'static [Case] {
     const fn case(
         name: &'static str,
         demands: &'static str,
-        run: fn(&Subject<'_>) -> Answer,
+        run: fn(&Subject<'_>) -> CaseResult,
     ) -> Case {
         Case { name, demands, run }
     }
     const CASES: &[Case] = &[
         case("report", "has an id, a title, a citation, and parameters with units", description),
         case("unknown-parameter", "refuses a parameter that it does not have", unknown_parameter),
-        case("defaults", "does with its documented defaults what it does without", defaults),
-        case("valid-sphere", "gives valid results on a sphere", |s| valid_on(s, "sphere")),
-        case("valid-box", "gives valid results on a box", |s| valid_on(s, "box")),
-        case("valid-capsule", "gives valid results on a capsule", |s| valid_on(s, "capsule")),
-        case("valid-torus", "gives valid results on a torus", |s| valid_on(s, "torus")),
-        case("valid-hollow", "gives valid results on a hollow sphere", |s| {
+        case("defaults", "has the same result with its documented defaults as without", defaults),
+        case("valid-sphere", "has valid results on a sphere", |s| valid_on(s, "sphere")),
+        case("valid-box", "has valid results on a box", |s| valid_on(s, "box")),
+        case("valid-capsule", "has valid results on a capsule", |s| valid_on(s, "capsule")),
+        case("valid-torus", "has valid results on a torus", |s| valid_on(s, "torus")),
+        case("valid-hollow", "has valid results on a hollow sphere", |s| {
             valid_on(s, "hollow-sphere")
         }),
-        case("valid-bracket", "gives valid results on a bracket", |s| valid_on(s, "bracket")),
-        case("valid-parts", "gives valid results on two boxes apart", |s| valid_on(s, PARTS)),
-        case("valid-plate", "answers or refuses a plate of a ten-thousandth", |s| {
+        case("valid-bracket", "has valid results on a bracket", |s| valid_on(s, "bracket")),
+        case("valid-parts", "has valid results on two separate boxes", |s| valid_on(s, PARTS)),
+        case("valid-plate", "handles or refuses a very thin plate (1 : 10,000)", |s| {
             valid_or_refused(s, PLATE)
         }),
-        case("valid-tetrahedron", "answers or refuses a solid of four vertices", |s| {
+        case("valid-tetrahedron", "handles or refuses a solid of four vertices", |s| {
             valid_or_refused(s, TETRAHEDRON)
         }),
-        case("valid-cube", "answers or refuses a solid of eight vertices", |s| {
+        case("valid-cube", "handles or refuses a solid of eight vertices", |s| {
             valid_or_refused(s, CUBE)
         }),
-        case("counts", "meets numbers of spheres to 2 %, or warns why not", counts_met),
-        case("counts-above", "gives all it has where more is asked", counts_above),
-        case("no-spheres", "refuses to give no sphere", no_spheres),
-        case("native", "refuses senseless native levels, or says that it has none", native_level),
-        case("published", "answers its published level, or says why not", published_level),
-        case("continuing", "gives after other levels what it gives alone", continuing),
-        case("repeated", "gives the same medial mesh each time, bit by bit", repeated),
-        case("threads", "gives the same medial mesh with 1, 2 and 5 threads", threads),
-        case("scale", "gives the same medial mesh in other units", scale),
-        case("cancelled-before", "ends soon when it is cancelled from the start", cancelled_before),
-        case("cancelled-within", "ends soon when it is cancelled at work", cancelled_within),
-        case("given-initial", "starts from a given medial mesh, or says why not", given_initial),
+        case("counts", "meets sphere counts to 2 %, or warns with a reason", counts_met),
+        case("counts-above", "returns all spheres where more are requested", counts_above),
+        case("no-spheres", "refuses a count of 0 spheres", no_spheres),
+        case("native", "refuses invalid native levels, or all of them", native_level),
+        case("published", "has a published level, or refuses it with a reason", published_level),
+        case("continuing", "has the same result after other levels as alone", continuing),
+        case("repeated", "has the same result each time, bit by bit", repeated),
+        case("threads", "has the same result with 1, 2 and 5 threads", threads),
+        case("scale", "has the same result in other units", scale),
+        case("cancelled-before", "ends soon when cancelled before the start", cancelled_before),
+        case("cancelled-within", "ends soon when cancelled during the run", cancelled_within),
+        case("given-initial", "starts from a given medial mesh, or refuses it", given_initial),
     ];
     CASES
 }
@@ -105,7 +104,7 @@ pub fn find(name: &str) -> Option<&'static Case> {
 }
 
 impl Case {
-    /// Puts the method to the test. A panic of the method is for the caller to catch.
+    /// Runs the case. The caller has to catch panics of the method.
     pub fn run(&self, subject: &Subject<'_>) -> Outcome {
         (self.run)(subject).map_or_else(|outcome| outcome, Outcome::Passed)
     }
@@ -116,7 +115,7 @@ fn failed<T>(why: impl Into<String>) -> Result<T, Outcome> {
 }
 
 impl Subject<'_> {
-    /// The method on a shape, with nothing asked yet.
+    /// The prepared method on a shape.
     fn prepare<'s>(&self, shape: &'s Shape) -> Result<Box<dyn Simplification + 's>, Outcome> {
         let place = format!("preparing the {}", shape.name());
         (self.doing)(&place);
@@ -125,8 +124,8 @@ impl Subject<'_> {
             .map_err(|error| miss(&place, &error))
     }
 
-    /// A sound result at a level.
-    fn ask(
+    /// The result at a level, which must be sound.
+    fn at(
         &self,
         simplification: &mut dyn Simplification,
         shape: &Shape,
@@ -139,36 +138,35 @@ impl Subject<'_> {
         Ok(result)
     }
 
-    /// The level that stands for a number of spheres: the published one for a method that cannot be
-    /// asked for numbers.
+    /// The level for a number of spheres: the published one for a method without sphere counts.
     fn level(
         &self,
         simplification: &mut dyn Simplification,
         count: usize,
     ) -> Result<Level, Outcome> {
         let level = Level::Spheres(count);
-        (self.doing)(&format!("asking for {level}"));
+        (self.doing)(&format!("trying {level}"));
         // Any other error belongs to this level, and the case of this level reports it.
         let Err(SimplifyError::Unsupported { why }) = simplification.at(level) else {
             return Ok(level);
         };
         match simplification.at(Level::Published) {
             Err(SimplifyError::Unsupported { .. }) => Err(Outcome::Skipped(format!(
-                "it answers neither numbers of spheres nor the published level ({why})"
+                "it supports neither sphere counts nor a published level ({why})"
             ))),
             _ => Ok(Level::Published),
         }
     }
 
-    /// The medial mesh that a method gives for a number of spheres when asked for nothing else.
+    /// The medial mesh of a number of spheres, without earlier levels.
     fn mesh(&self, shape: &Shape, count: usize) -> Result<MedialMesh, Outcome> {
-        // Two preparations: which level it is must not change what it gives.
+        // Two preparations: the choice of the level must not change the result.
         let level = self.level(self.prepare(shape)?.as_mut(), count)?;
-        Ok(self.ask(self.prepare(shape)?.as_mut(), shape, level)?.mesh)
+        Ok(self.at(self.prepare(shape)?.as_mut(), shape, level)?.mesh)
     }
 }
 
-/// What an error at a place means: that something is not done by a method is an answer.
+/// The outcome of an error: an unsupported request skips the case.
 fn miss(place: &str, error: &SimplifyError) -> Outcome {
     match error {
         SimplifyError::Unsupported { why } => Outcome::Skipped(format!("{place}: {why}")),

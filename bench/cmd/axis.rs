@@ -18,7 +18,7 @@ use crate::provenance::peak_bytes;
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
-    /// The medial mesh (.ma, .ply, .obj, .vtp, .glb), in the units of the surface.
+    /// Write the medial mesh (.ma, .ply, .obj, .vtp, .glb) in the units of the surface.
     #[arg(short, long)]
     output: Option<PathBuf>,
     #[command(flatten)]

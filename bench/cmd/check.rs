@@ -20,18 +20,18 @@ use crate::study::registry::{Entry, Registry};
 /// Arguments of `check`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Methods [default: all but those on request, those of `--plugins` too].
+    /// Methods [default: all, with plug-ins, but those that run on request].
     ids: Vec<String>,
-    /// Run these cases alone; can be given several times [default: all].
+    /// Run this case; repeatable [default: all].
     #[arg(long = "case", value_name = "NAME")]
     cases: Vec<String>,
-    /// Set a parameter of the methods; can be given several times.
+    /// Set a parameter of the methods; repeatable.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
     set: Vec<(String, String)>,
-    /// End a case after so many seconds [default: 300].
+    /// Stop a case after SECONDS [default: 300].
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     timeout: Option<f64>,
-    /// End a case that needs more megabytes [default: three quarters of the machine's].
+    /// Stop a case that uses more than MB megabytes [default: 3/4 of the machine's memory].
     #[arg(long, value_name = "MB")]
     memory: Option<u64>,
 }
@@ -39,12 +39,12 @@ pub struct Arguments {
 /// Runs the verb.
 ///
 /// # Errors
-/// When a method, a case or a parameter does not exist, or no worker can be started. A case that a
-/// method fails is no error here: it is a line of the output, and sets the exit code.
+/// When a method, a case or a parameter does not exist, or no worker can be started. A failed case is
+/// a line of the output and sets the exit code.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let items = arguments.items(registry)?;
     let interrupted = interrupt::listen();
-    // No record is kept: a case has an outcome only, and no provenance.
+    // A case has no record and needs no provenance.
     let mut supervisor =
         Supervisor::new(registry.files(), &Provenance::default(), None, interrupted);
     let (mut counts, mut list) = ([0; 3], Vec::new());
@@ -72,7 +72,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         let end = match &outcome {
             Outcome::Passed(remarks) if remarks.is_empty() => "ok".to_owned(),
             Outcome::Passed(remarks) => format!("ok ({})", remarks.join("; ")),
-            Outcome::Failed(why) => format!("FAILED: {why} (demanded: {demands})"),
+            Outcome::Failed(why) => format!("FAILED: {why} (expected: {demands})"),
             Outcome::Skipped(why) => format!("skipped: {why}"),
         };
         print_line(&format!("{id:<14} {name:<18} {seconds:>6.1} s  {end}"));
@@ -104,7 +104,7 @@ impl Arguments {
         let known = || cases().iter().map(|case| case.name).collect::<Vec<_>>().join(", ");
         let found = self.cases.iter().map(|name| {
             find(name).ok_or_else(|| {
-                Failure::usage(format!("no case is called `{name}`; there are: {}", known()))
+                Failure::usage(format!("unknown case `{name}` (expected one of: {})", known()))
             })
         });
         found.collect()
@@ -126,7 +126,8 @@ impl Arguments {
             if let Some(key) =
                 params.0.keys().find(|key| documented.iter().all(|p| p.name != **key))
             {
-                return Err(Failure::usage(format!("--set {key}: {id} has no such parameter")));
+                let advice = format!("list them by `medial methods {id}`");
+                return Err(Failure::usage(format!("--set {key}: unknown parameter; {advice}")));
             }
             items.extend(cases.iter().map(|&case| {
                 let method = MethodSpec {

@@ -17,7 +17,7 @@ use crate::output::{note, print_error, print_json, print_line};
 use crate::provenance::Provenance;
 use crate::rebuild::{Rebuilt, RunReport, write_study};
 use crate::store::{AXES, PAGE, RESULTS, Store};
-use crate::study::external::{GIVEN, Given};
+use crate::study::external::{ExternalResult, GIVEN};
 use crate::study::item::{Item, Keep};
 use crate::study::registry::Registry;
 use crate::study::source::Source;
@@ -26,41 +26,39 @@ use crate::study::{Study, StudyMethod, shard};
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface files (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME` [default: three built-in shapes,
-    /// `bracket`, `torus` and `blob`; `--dataset builtin` runs all].
+    /// Surface files (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`
+    /// [default: `builtin:bracket`, `builtin:torus` and `builtin:blob`].
     meshes: Vec<MeshArgument>,
-    /// A set of meshes beside those named: `builtin`, `public`, `defective`, `small`, `papers`, a package as in
-    /// `deb:libcgal-demo`, or the name of one mesh; can be given several times.
+    /// Add a set of meshes: `builtin`, `public`, `defective`, `small`, `papers`, a package such as
+    /// `deb:libcgal-demo`, or the name of one mesh; repeatable.
     #[arg(long, value_name = "SET")]
     dataset: Vec<String>,
-    /// Take meshes, methods, levels and limits from a TOML file; what else is given wins over it.
+    /// Read meshes, methods, levels and limits from a TOML file; the command line takes precedence.
     #[arg(long, value_name = "FILE")]
     study: Option<PathBuf>,
-    /// Methods, separated by commas, each with parameters of its own if wanted: `qmat,qmat:k=0`
+    /// Run these methods, separated by commas, with parameters as in `qmat,qmat:k=0`
     /// [default: all but those that run on request].
     #[arg(long, value_name = "ID[:KEY=VALUE]", value_delimiter = ',')]
     methods: Vec<String>,
-    /// Sphere counts, separated by commas [default: 500,200,100].
+    /// Simplify to these sphere counts [default: 500,200,100].
     #[arg(long, value_name = "COUNTS", value_delimiter = ',')]
     spheres: Vec<usize>,
-    /// Levels of a method's own beside the counts, in place of its default sweep; can be given
-    /// several times.
+    /// Run method ID at these native levels instead of its default sweep; repeatable.
     #[arg(long, value_name = "ID=X,Y")]
     levels: Vec<String>,
-    /// Counts alone: no levels of the methods' own but those given, no row of the initial medial
-    /// mesh.
+    /// Skip the default sweeps of native levels and the initial medial mesh.
     #[arg(long)]
     counts_only: bool,
-    /// Search the fewest spheres within each of these Hausdorff errors, fractions of the diagonal.
+    /// Search the fewest spheres within each of these Hausdorff errors, as fractions of the diagonal.
     #[arg(long, value_name = "E,F", value_delimiter = ',')]
     max_error: Vec<f64>,
-    /// Also run these methods from what each filter leaves: `qmat` adds `angle+qmat` and so on.
+    /// Also run these methods on the output of each filter: `qmat` adds `angle+qmat` and so on.
     #[arg(long, value_name = "IDS", value_delimiter = ',')]
     after_filters: Vec<String>,
     /// Also run each method at its published level.
     #[arg(long)]
     published: bool,
-    /// Set a parameter of one method; can be given several times.
+    /// Set a parameter of one method; repeatable.
     #[arg(long = "set", value_name = "METHOD.KEY=VALUE")]
     set: Vec<String>,
     /// Add medial meshes computed elsewhere as results of method NAME: a file, `NAME@MESH=FILE` with several
@@ -68,42 +66,41 @@ pub struct Arguments {
     /// `--spheres`.
     #[arg(long, value_name = "NAME=PATH")]
     given: Vec<String>,
-    /// Time each item so many times, the methods in turn; the median is reported, all are kept
-    /// [default: 1].
+    /// Time each item N times, alternating between methods, and report the median [default: 1].
     #[arg(long, value_name = "N")]
     repeat: Option<usize>,
-    /// Run share I of N of the items, into a folder of its own; `medial report` merges the folders.
+    /// Run share I of N of the items; merge the folders by `medial report`.
     #[arg(long, value_name = "I/N")]
     shard: Option<String>,
-    /// Folder of the results. What is there already is not run again.
+    /// Write results to this folder, and skip items that it already has.
     #[arg(long, value_name = "DIR", default_value = "medial-report")]
     out: PathBuf,
     /// Remove the results in the folder first.
     #[arg(long)]
     fresh: bool,
-    /// Run again what failed.
+    /// Run failed items again.
     #[arg(long)]
     retry_failed: bool,
-    /// End an item after so many seconds [default: 300].
+    /// Stop an item after SECONDS [default: 300].
     #[arg(long, value_name = "SECONDS")]
     timeout: Option<f64>,
-    /// Seconds after which a method begins no further level on a mesh; the others are `skipped` [default: 60].
+    /// Start no further level of a method on a mesh after SECONDS, and mark the rest `skipped` [default: 60].
     #[arg(long, value_name = "SECONDS")]
     budget: Option<f64>,
-    /// Run N items at the same time; their seconds are in no table [default: 1].
+    /// Run N items at the same time; tables then omit seconds [default: 1].
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
-    /// Exit with 3 when any result is not as requested, not only after failures.
+    /// Exit with code 3 when any result is not as requested, not only after failures.
     #[arg(long)]
     strict: bool,
-    /// End an item that needs more megabytes [default: three quarters of the machine's, shared by the jobs].
+    /// Stop an item that uses more than MB megabytes [default: 3/4 of the machine's memory, divided by the jobs].
     #[arg(long, value_name = "MB")]
     memory: Option<u64>,
-    /// Results that stay on disk as `.ma`: `small` leaves out those of more than 1,000 spheres at levels of a method's
-    /// own [default: small].
+    /// Write results as `.ma`: `all`, `none`, or `small`, which omits native levels of more than
+    /// 1,000 spheres [default: small].
     #[arg(long, value_enum, value_name = "WHICH", hide_possible_values = true)]
     keep: Option<Keep>,
-    /// Certify each Hausdorff error by an interval of this width, a fraction of the diagonal.
+    /// Certify each Hausdorff error by an interval of this width, as a fraction of the diagonal.
     #[arg(long, value_name = "WIDTH")]
     certify: Option<f64>,
     #[command(flatten)]
@@ -116,8 +113,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// When the command line or the study is wrong, an input does not exist, or the results cannot be
-/// written: then nothing was run and nothing is lost. Meshes that are refused and methods that fail
-/// are rows of the results.
+/// written, before any run. Refused meshes and failed methods are rows of the results.
 pub fn run(
     arguments: &Arguments,
     global: &Global,
@@ -145,7 +141,7 @@ pub fn run(
         true => (items.clone(), 0),
         false => missing(&items, &side.store, arguments.retry_failed),
     };
-    // Before anything is cleared: a misspelt parameter must not cost earlier results.
+    // Before `clear`: a misspelt parameter must not cost earlier results.
     if let Some(why) = refused_params(&left, &mut side.supervisors[0])? {
         return Err(Failure::usage(why));
     }
@@ -156,7 +152,7 @@ pub fn run(
     if !left.is_empty() {
         write_study(&arguments.out, &study)?;
     }
-    // Mesh by mesh from cheap to dear, so that there is something to see soon.
+    // Mesh by mesh from cheap to expensive, so that first results come soon.
     for scene in left.chunk_by_mut(|a, b| a.scene == b.scene) {
         scene.sort_by_key(|item| match item.method.id.as_str() {
             GIVEN => 0,
@@ -171,20 +167,20 @@ pub fn run(
     let running = Running { total: methods_of(&items).len(), ..Running::default() };
     let mut pages = Pages { report: &report, running, due };
     if adds && dir.join(PAGE).exists() {
-        // An earlier page must not pass for one of all records, however this run ends.
+        // An earlier page must not pass for a page of all records, even after a killed run.
         pages.write(&left.iter().collect::<Vec<_>>());
     }
-    let mut on_kept = |waiting: &[&Item]| pages.write(waiting);
+    let mut on_recorded = |waiting: &[&Item]| pages.write(waiting);
     let sides = std::slice::from_mut(&mut side);
-    let ended = run_items(&left, sides, global.progress(), &mut on_kept);
+    let ended = run_items(&left, sides, global.progress(), &mut on_recorded);
     let run = side.store.added;
-    // Nothing looks at the flag from here on.
+    // The flag has no effect from here on.
     if interrupt::stop_listening() || matches!(ended, Err(RunError::Interrupted)) {
         if run > 0 {
             report.write(Some(pages.running), false)?;
         }
         print_error(&format!(
-            "interrupted: {run} of {levels} results were made and are kept; the same command goes on from there"
+            "interrupted: recorded {run} of {levels} results; run the same command again to resume"
         ));
         return Ok(Exit::Interrupted);
     }
@@ -195,7 +191,7 @@ pub fn run(
     undrawn.iter().for_each(|why| note(global, why));
     let records = of_items(records, &items);
     let shown: HashSet<String> = left.iter().flat_map(Item::keys).collect();
-    // Those of this run are on the screen.
+    // The reasons of this run are on the screen.
     let earlier: Vec<Record> =
         records.iter().filter(|record| !shown.contains(&record.key)).cloned().collect();
     reasons(&earlier).iter().for_each(|reason| print_error(reason));
@@ -209,12 +205,12 @@ fn methods_of<'i>(items: impl IntoIterator<Item = &'i Item>) -> Vec<String> {
     labels.filter(|label| seen.insert(label.clone())).collect()
 }
 
-/// The pages of a run that goes on. They take at most about a tenth of its time.
+/// The pages during a run. They take at most about a tenth of its time.
 struct Pages<'r> {
     report: &'r RunReport<'r>,
     /// The state that the next page shows.
     running: Running,
-    /// When the next page is due, and the next one with new pictures.
+    /// The times of the next page, and of the next one with new pictures.
     due: [Instant; 2],
 }
 
@@ -222,7 +218,7 @@ struct Pages<'r> {
 const PAUSES: [Duration; 2] = [Duration::ZERO, Duration::from_secs(10)];
 
 impl Pages<'_> {
-    /// Writes a page that names the waiting items, if one is due. The last page is that of the whole run.
+    /// Writes a page with the list of waiting items, if one is due. The last page is that of the whole run.
     fn write(&mut self, waiting: &[&Item]) {
         let (begun, running) = (Instant::now(), &mut self.running);
         running.missing = methods_of(waiting.iter().copied());
@@ -231,14 +227,14 @@ impl Pages<'_> {
             return;
         }
         let draws = begun >= self.due[1];
-        // A fault of the folder ends the run where records or the last page meet it.
+        // A fault of the folder ends the run at the next record or at the last page.
         let _ = self.report.write(Some(running.clone()), draws);
         let kind = usize::from(draws);
         self.due[kind] = Instant::now() + PAUSES[kind].max(10 * begun.elapsed());
     }
 }
 
-/// The study that the command line asks for, on top of the file where one is given.
+/// The study of the command line, based on the study file if there is one.
 fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     let mut study = match &arguments.study {
         Some(path) => Study::read(path)?,
@@ -255,13 +251,13 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
         study.methods = methods.collect::<Result<_, _>>()?;
     }
     for text in &arguments.given {
-        let mut given = Given::parse(text).map_err(Failure::usage)?;
-        // It is written into the study of the store, which lies elsewhere.
+        let mut given = ExternalResult::parse(text).map_err(Failure::usage)?;
+        // It is written into the study of the store, in another folder.
         given.file = absolute(&given.file);
         study.given.push(given);
     }
     if arguments.study.is_none() && arguments.spheres.is_empty() && !study.given.is_empty() {
-        study.spheres = study.given_counts()?;
+        study.spheres = study.external_counts()?;
     }
     replace(&mut study.spheres, &arguments.spheres);
     replace(&mut study.max_error, &arguments.max_error);
@@ -282,7 +278,7 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     Ok(study)
 }
 
-/// Lists of the command line replace those of the study; an empty one was not given.
+/// Lists of the command line replace those of the study unless they are empty.
 fn replace<T: Clone>(own: &mut Vec<T>, given: &[T]) {
     if !given.is_empty() {
         *own = given.to_vec();
@@ -290,7 +286,7 @@ fn replace<T: Clone>(own: &mut Vec<T>, given: &[T]) {
 }
 
 /// A path of the command line.
-// It starts at the working folder, unlike paths of a study file, which start at that of the file.
+// It is relative to the working folder, unlike paths of a study file, which are relative to that file.
 fn absolute(path: &PathBuf) -> PathBuf {
     match Source::is_name(path) {
         true => path.clone(),
@@ -299,7 +295,7 @@ fn absolute(path: &PathBuf) -> PathBuf {
 }
 
 impl Arguments {
-    /// Applies `--set` and `--levels`, which name methods, once it is known which run.
+    /// Applies `--set` and `--levels` to the methods of the study.
     fn apply_to_methods(&self, study: &mut Study, registry: &Registry) -> Result<(), Failure> {
         if self.set.is_empty() && self.levels.is_empty() {
             return Ok(());
@@ -312,15 +308,16 @@ impl Arguments {
                 let (method, key) = name.split_once('.')?;
                 Some((method, key, value))
             });
-            let (id, key, value) = parts
-                .ok_or_else(|| Failure::usage(format!("--set {word}: write METHOD.KEY=VALUE")))?;
+            let (id, key, value) = parts.ok_or_else(|| {
+                Failure::usage(format!("--set {word}: expected METHOD.KEY=VALUE"))
+            })?;
             for method in named(study, id, &format!("--set {word}"))? {
                 method.params.set(key, value);
             }
         }
         for word in &self.levels {
             let wrong =
-                || Failure::usage(format!("--levels {word}: write METHOD=LEVEL[,LEVEL...]"));
+                || Failure::usage(format!("--levels {word}: expected METHOD=LEVEL[,LEVEL...]"));
             let (id, list) = word.split_once('=').ok_or_else(wrong)?;
             let levels = list.split(',').map(|level| level.trim().parse::<f64>());
             let levels: Vec<f64> = levels.collect::<Result<_, _>>().map_err(|_| wrong())?;
@@ -332,7 +329,7 @@ impl Arguments {
     }
 }
 
-/// All rows of a study that are of one method.
+/// All rows of a study with one method.
 fn named<'s>(
     study: &'s mut Study,
     id: &str,
@@ -340,7 +337,7 @@ fn named<'s>(
 ) -> Result<Vec<&'s mut StudyMethod>, Failure> {
     let rows: Vec<_> = study.methods.iter_mut().filter(|method| method.id == id).collect();
     if rows.is_empty() {
-        return Err(Failure::usage(format!("{option}: `{id}` is not among the methods that run")));
+        return Err(Failure::usage(format!("{option}: `{id}` does not run; add it by --methods")));
     }
     Ok(rows)
 }
@@ -377,12 +374,12 @@ fn finish(
             let methods = read_header(out).unwrap_or_default().methods;
             print_line(&medial_reports::summary_text(records, &methods));
         }
-        let given = match count(records, Status::External) {
+        let external = match count(records, Status::External) {
             0 => String::new(),
-            files => format!(" ({files} as given)"),
+            files => format!(" ({files} external)"),
         };
         print_line(&format!(
-            "{ok} of {} results as asked{given}{}; {run} run now, {found} found; page: {}",
+            "{ok} of {} results as requested{external}{}; {run} run now, {found} found; page: {}",
             records.len(),
             others(records),
             page.display()
@@ -397,7 +394,7 @@ fn finish(
     })
 }
 
-/// What became of the results that are not as asked: `, 2 other count, 1 failed`.
+/// The numbers of results that are not as requested: `, 2 other count, 1 failed`.
 fn others(records: &[Record]) -> String {
     let others = Status::ALL.into_iter().filter(|status| !status.is_ok());
     let counted = others.map(|status| (status, count(records, status)));

@@ -22,22 +22,22 @@ pub struct Arguments {
     /// Surface (OFF, OBJ, PLY, STL) or medial mesh (.ma and its dialects, .ply or .obj with radii).
     from: PathBuf,
     /// Surface (OFF, OBJ, PLY) or medial mesh (.ma, .ply, .obj, .vtp for ParaView, .glb for Blender and browsers).
-    /// `.glb` has single precision, and its y is up: z here, as Blender shows it.
+    /// `.glb` has single precision, and its upward axis y is z of the input.
     to: PathBuf,
-    /// Take the lines of a medial mesh as they are where its header announces another number of them.
+    /// Read all lines of a medial mesh whose header states a different number.
     #[arg(long)]
     lenient: bool,
-    /// Which medial mesh is meant of a file to which several were appended, from 1.
+    /// Read the K-th medial mesh of a file that holds several, counted from 1.
     #[arg(long, value_name = "K")]
     block: Option<usize>,
     #[command(flatten)]
     look: LookArguments,
 }
 
-/// Runs the verb. Surfaces are repaired on the way, and every repair is told.
+/// Runs the verb. Repairs surfaces and prints every repair.
 ///
 /// # Errors
-/// When the input is refused, the pair of formats makes no sense, or the output cannot be written.
+/// When the input is refused, the pair of formats does not match, or the output cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let (notes, vertices, faces) = if is_medial(&arguments.from)? {
         arguments.look.check(&arguments.to)?;
@@ -48,15 +48,15 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         let (mesh, mut notes) = loaded.with_remarks();
         notes.extend(loss(&arguments.to, &mesh));
         (notes, mesh.spheres.len(), mesh.faces.len())
-    } else if arguments.look.is_asked() {
+    } else if arguments.look.is_set() {
         let from = arguments.from.display();
         return Err(Failure::usage(format!(
-            "{from} is a surface: only medial meshes have colours"
+            "{from}: a surface has no colours; name a medial mesh"
         )));
     // A medial mesh of a surface is computed, not converted.
     } else if ["ma", "vtp", "glb"].contains(&extension(&arguments.to).as_str()) {
         return Err(Failure::usage(format!(
-            "a surface is not a medial mesh: `medial axis {} -o {}` computes one",
+            "{0}: a surface, not a medial mesh; compute one by `medial axis {0} -o {1}`",
             arguments.from.display(),
             arguments.to.display()
         )));
@@ -83,38 +83,38 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
 /// Options of formats for viewers.
 #[derive(Debug, Args)]
 struct LookArguments {
-    /// What `.glb` is coloured by, and an array beside the radii in `.vtp` [default: radius].
+    /// Colour `.glb` by this, and add it to `.vtp` as an array [default: radius].
     #[arg(long, alias = "colour", value_enum)]
     color: Option<Colour>,
-    /// The surface (a file, or `builtin:ID[:RESOLUTION]`) that errors are measured to, in the units of the medial mesh.
+    /// Measure errors to this surface (a file, or `builtin:ID[:RESOLUTION]`) in the units of the medial mesh.
     #[arg(long, value_name = "SURFACE")]
     mesh: Option<MeshArgument>,
-    /// The spheres as round bodies as well, in `.glb`: one mesh of 80 triangles and 2.3 kB a sphere.
+    /// Add the spheres to `.glb` as round bodies, each of 80 triangles and 2.3 kB.
     #[arg(long)]
     spheres: bool,
 }
 
-/// What a medial mesh is coloured by.
+/// The quantity behind the colours of a medial mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Colour {
     /// The radii of the spheres.
     Radius,
-    /// Of each sphere the least stability ratio of its edges.
+    /// The least stability ratio of the edges of each sphere.
     Stability,
-    /// By how much each sphere reaches out of the surface of `--mesh` (red) or falls short of it (blue).
+    /// The distance by which each sphere exceeds the surface (red) or falls short of it (blue).
     Error,
 }
 
 impl LookArguments {
     /// Whether any of the options was given.
-    fn is_asked(&self) -> bool {
+    fn is_set(&self) -> bool {
         self.color.is_some() || self.mesh.is_some() || self.spheres
     }
 
-    /// Refuses what the output has no room for, and what lacks something, before anything is read.
+    /// Refuses options that the output format lacks, and incomplete ones, before any file is read.
     ///
     /// # Errors
-    /// When it is so.
+    /// Names the option.
     fn check(&self, to: &Path) -> Result<(), Failure> {
         for (is_set, option, extensions) in [
             (self.color.is_some(), "--color", &["vtp", "glb"][..]),
@@ -126,14 +126,14 @@ impl LookArguments {
         }
         match (self.color, &self.mesh) {
             (Some(Colour::Error), None) => {
-                Err(Failure::usage("--color error: name the surface with --mesh"))
+                Err(Failure::usage("--color error: no surface; give --mesh MESH"))
             }
             (Some(Colour::Error), Some(_)) | (_, None) => Ok(()),
-            (_, Some(_)) => Err(Failure::usage("--mesh is for --color error only")),
+            (_, Some(_)) => Err(Failure::usage("--mesh requires --color error")),
         }
     }
 
-    /// Reads a medial mesh, and how it is shown.
+    /// Reads a medial mesh and its display options.
     ///
     /// # Errors
     /// When it or the surface is refused, or they cannot belong together.
@@ -177,10 +177,10 @@ fn diagonal(mesh: &MedialMesh) -> f64 {
     if diagonal > 0.0 && diagonal.is_finite() { diagonal } else { 1.0 }
 }
 
-/// What is lost in a file of single precision, if it is one.
+/// A note on the rounding of a file with single precision.
 fn loss(to: &Path, mesh: &MedialMesh) -> Option<String> {
     (extension(to) == "glb").then(|| {
         let loss = single_precision_loss(mesh);
-        format!("single precision: coordinates and radii are rounded by at most {loss:.1e}")
+        format!("rounded coordinates and radii to single precision, by at most {loss:.1e}")
     })
 }

@@ -1,4 +1,4 @@
-//! `medial datasets`: the built-in shapes, and the meshes that are kept by name.
+//! `medial datasets`: built-in shapes and published meshes.
 
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -25,7 +25,7 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// List the built-in shapes, and the meshes that are known by name with their state.
+    /// List the built-in shapes and the published meshes with their state.
     List,
     /// Write a built-in shape as a surface file.
     Make(Make),
@@ -37,16 +37,16 @@ enum Action {
 struct Make {
     /// Id of the shape.
     id: String,
-    /// The file (OFF, OBJ, PLY).
+    /// Write the surface to this file (OFF, OBJ, PLY).
     #[arg(short, long)]
     output: PathBuf,
-    /// Resolution, in the shape's own meaning [default: that of `compare`].
+    /// Set the resolution; its meaning depends on the shape [default: as in `compare`].
     #[arg(long)]
     resolution: Option<u32>,
     /// Displace each vertex uniformly in a ball of this radius, a fraction of the diagonal from 0 to 1.
     #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
     noise: f64,
-    /// Seed of the noise.
+    /// Set the seed of the noise.
     #[arg(long, default_value_t = 0)]
     seed: u64,
 }
@@ -67,7 +67,7 @@ fn write(make: &Make, global: &Global) -> Result<Exit, Failure> {
     let source = Source::BuiltIn { id: make.id.clone(), resolution: make.resolution };
     let input = Input::load(&source).map_err(Failure::usage)?;
     if !(0.0..=1.0).contains(&make.noise) {
-        return Err(Failure::usage(format!("--noise {}: give a fraction from 0 to 1", make.noise)));
+        return Err(Failure::usage(format!("--noise {}: expected 0 to 1", make.noise)));
     }
     let mesh = medial_datasets::add_noise(&input.mesh, make.noise, make.seed);
     surface::write(&make.output, &mesh).map_err(Failure::input)?;
@@ -88,14 +88,14 @@ const SCRIPT: &str = include_str!("../../scripts/fetch_meshes.py");
 
 #[derive(Debug, Args)]
 struct Fetch {
-    /// Sets (`public`, `defective`, `small`), packages as in `deb:libcgal-demo`, or names of meshes.
-    #[arg(default_value = "public")]
-    wanted: Vec<String>,
-    /// Take meshes from this archive (.deb, .whl, .zip, .tgz, .tar.gz, .tar.xz) or surface file and fetch nothing;
+    /// Sets (`public`, `defective`, `small`), packages such as `deb:libcgal-demo`, or names of meshes.
+    #[arg(default_value = "public", value_name = "NAME")]
+    names: Vec<String>,
+    /// Extract meshes from this archive (.deb, .whl, .zip, .tgz, .tar.gz, .tar.xz) or surface file and fetch nothing;
     /// repeatable.
     #[arg(long, value_name = "ARCHIVE")]
     from: Vec<PathBuf>,
-    /// End a client (apt-get, pip, npm) after SECONDS.
+    /// Stop a client (apt-get, pip, npm) after SECONDS.
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 600.0)]
     timeout: f64,
 }
@@ -106,9 +106,9 @@ struct Fetch {
 /// When a word is unknown, Python is not installed, or the script refuses its input.
 fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     let library = Library::here()?;
-    for word in &arguments.wanted {
-        // Here rather than in the script: the message can name what was meant.
-        library.wanted(word)?;
+    for word in &arguments.names {
+        // Here rather than in the script: the message can suggest a similar name.
+        library.matching(word)?;
     }
     let failed = |error: std::io::Error| Failure::input(format!("fetch_meshes.py: {error}"));
     // The script is a part of this program: nothing has to be installed next to it.
@@ -116,9 +116,9 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     let script = scratch.path().join("fetch_meshes.py");
     fs::write(&script, SCRIPT).map_err(failed)?;
     let mut command = Command::new("python3");
-    command.arg(&script).args(&arguments.wanted).arg("--cache").arg(library.folder());
+    command.arg(&script).args(&arguments.names).arg("--cache").arg(library.folder());
     command.arg("--timeout").arg(arguments.timeout.to_string());
-    // The script reads the variable itself, and knows no embedded catalogue.
+    // The script reads the variable itself, and has no embedded catalogue.
     if env::var_os("MEDIAL_CATALOGUE").is_none_or(|value| value.is_empty()) {
         let catalogue = scratch.path().join("catalogue.toml");
         fs::write(&catalogue, published::EMBEDDED).map_err(failed)?;
@@ -130,13 +130,13 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     command.stderr(if global.quiet { Stdio::null() } else { Stdio::inherit() });
     let output = command.arg("--json").output().map_err(|error| match error.kind() {
         std::io::ErrorKind::NotFound => {
-            Failure::input("python3 3.11 or later is needed to fetch meshes; install it")
+            Failure::input("python3: not found; install Python 3.11 or later")
         }
         _ => failed(error),
     })?;
     let exit = match output.status.code() {
         Some(0) => Exit::Done,
-        // Missing meshes are no error of the command: the others are stored.
+        // Missing meshes are not an error of the command: the others are stored.
         Some(3) => Exit::SomeFailed,
         _ => return Err(Failure::input(format!("fetch_meshes.py: {}", output.status))),
     };
@@ -146,7 +146,7 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
         print_json(&report, &[]);
     } else {
         print_line(&format!(
-            "{} of {} meshes are stored in {}, {} are new",
+            "{} of {} meshes stored in {}, {} new",
             report["verified"],
             report["wanted"],
             library.folder().display(),
@@ -156,7 +156,7 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     Ok(exit)
 }
 
-/// Lists everything that has a name.
+/// Lists built-in shapes and published meshes.
 ///
 /// # Errors
 /// When the library cannot be read.
@@ -189,7 +189,7 @@ fn list_all(global: &Global) -> Result<Exit, Failure> {
         ));
     }
     let in_default = shapes.iter().filter(|shape| shape.in_default).count();
-    print_line(&format!("compare --dataset builtin takes the first {in_default}"));
+    print_line(&format!("`medial compare --dataset builtin` runs the first {in_default}"));
     for set in Set::ALL {
         print_set(set, &states);
     }
@@ -227,8 +227,8 @@ fn print_set(set: Set, states: &[(&Published, State)]) {
 fn how(set: Set) -> &'static str {
     match set {
         Set::Public => "`medial datasets fetch public`, then `medial compare --dataset public`",
-        Set::Defective => "refused or to be repaired: `medial datasets fetch defective`",
-        Set::Small => "sound, of few vertices: `medial datasets fetch small`",
-        Set::Papers => "models of papers, taken by `medial datasets fetch --from FILE`",
+        Set::Defective => "defective meshes: `medial datasets fetch defective`",
+        Set::Small => "sound meshes of few vertices: `medial datasets fetch small`",
+        Set::Papers => "models of papers: add your copies by `medial datasets fetch --from FILE`",
     }
 }

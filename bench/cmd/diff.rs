@@ -1,6 +1,6 @@
-//! `medial diff OLD NEW`: what became worse from one set of results to another.
+//! `medial diff OLD NEW`: regressions from one set of results to another.
 //!
-//! With `--run` the two are builds of this program, which run a study in turn first.
+//! With `--run` the two are builds of this program, which first run a study alternately.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -26,29 +26,29 @@ use crate::study::registry::Registry;
 /// Arguments of `diff`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The older results: a folder, or its `results.jsonl`; with `--run` the older program.
+    /// Older results (a folder or its `results.jsonl`), or the older program with `--run`.
     old: PathBuf,
-    /// The newer ones.
+    /// Newer results, or the newer program.
     new: PathBuf,
-    /// Take two builds of this program, and run the study with both alternately.
+    /// Run a study with two builds of this program alternately.
     #[arg(long, requires = "study")]
     run: bool,
-    /// The study that both run.
+    /// Read the study from this TOML file.
     #[arg(long, value_name = "FILE", requires = "run")]
     study: Option<PathBuf>,
-    /// Folder of both results, and of the difference. What is there already is not run again.
+    /// Write both results and the difference to this folder, and skip items that it already has.
     #[arg(long, value_name = "DIR", default_value = "medial-diff", requires = "run")]
     out: PathBuf,
-    /// Repetitions of each item.
+    /// Time each item N times.
     #[arg(long, value_name = "N", default_value_t = 10, requires = "run")]
     repeat: usize,
-    /// From which on a larger error is a regression, as a fraction.
+    /// Report an increase of an error by more than this fraction.
     #[arg(long, value_name = "FRACTION", value_parser = share, default_value_t = DiffOptions::default().error)]
     error: f64,
-    /// From which on more memory is a regression, as a fraction.
+    /// Report an increase of memory by more than this fraction.
     #[arg(long, value_name = "FRACTION", value_parser = share, default_value_t = DiffOptions::default().memory)]
     memory: f64,
-    /// From which on more CPU seconds of a method are a regression, as a fraction.
+    /// Report an increase of a method's CPU seconds by more than this fraction.
     #[arg(long, value_name = "FRACTION", value_parser = share, default_value_t = DiffOptions::default().seconds)]
     seconds: f64,
 }
@@ -56,8 +56,8 @@ pub struct Arguments {
 /// Runs the verb.
 ///
 /// # Errors
-/// When the records of a side cannot be read, or with `--run` a program is no build of this one, the study is wrong, or
-/// results cannot be kept.
+/// When the records of a side cannot be read, or with `--run` a program is not a build of this one, the study is wrong,
+/// or results cannot be written.
 pub fn run(
     arguments: &Arguments,
     global: &Global,
@@ -79,7 +79,7 @@ pub fn run(
     };
     let diff = Diff::new(names, &old, &new, options);
     let markdown = diff.to_markdown();
-    // Two given folders are the user's: nothing is written there.
+    // Without `--run` both folders belong to the user: nothing is written there.
     if arguments.run {
         let json = serde_json::to_string_pretty(&diff).map_err(Failure::input)?;
         files::write(&arguments.out.join("diff.md"), markdown.as_bytes())?;
@@ -97,7 +97,7 @@ pub fn run(
     })
 }
 
-/// The records of a folder or of a file, of which there must be some.
+/// The records of a folder or of a file, at least one.
 fn some_records(path: &Path, global: &Global) -> Result<Vec<Record>, Failure> {
     let (records, bad_lines) = records(path)?;
     let file = if path.is_dir() { path.join(RESULTS) } else { path.to_owned() };
@@ -111,7 +111,7 @@ fn some_records(path: &Path, global: &Global) -> Result<Vec<Record>, Failure> {
     Ok(records)
 }
 
-/// Runs the study with both builds; the records of both, or nothing where the user interrupted.
+/// Runs the study with both builds. Returns the records of both, or `None` after an interrupt.
 fn alternate(
     arguments: &Arguments,
     global: &Global,
@@ -119,11 +119,11 @@ fn alternate(
 ) -> Result<Option<[Vec<Record>; 2]>, Failure> {
     let path = arguments.study.as_ref().expect("required by --run");
     let mut study = Study::read(path)?;
-    // Single runs differ by more than the changes that are looked for.
+    // Single runs differ by more than typical regressions.
     study.repeat = arguments.repeat;
     // The CPU seconds of several threads that wait for each other vary too much.
     study.threads = global.threads.or(study.threads).or(Some(1));
-    // Which levels a budget skips depends on the machine's load: the limit of time alone holds.
+    // The levels that a budget skips depend on the machine's load: only the time limit applies.
     study.budget = study.timeout;
     for file in &study.plugins {
         registry.add_plugins(&study.resolved(file)).map_err(Failure::usage)?;
@@ -134,7 +134,7 @@ fn alternate(
     let folders = ["old", "new"].map(|side| arguments.out.join(side));
     let entries: Vec<_> = listed(&arguments.out).collect();
     claim(&arguments.out, is_store(&folders[0], RESULTS), &entries)?;
-    // Before the process listens: a program that is none of ours may never end.
+    // Before the process listens for interrupts: another program may never end.
     let builds = [&arguments.old, &arguments.new].map(|program| Build::of(program));
     let interrupted = interrupt::listen();
     let mut sides = Vec::new();
@@ -156,7 +156,9 @@ fn alternate(
     });
     let ended = run_items(&left, &mut sides, global.progress(), &mut |_| ());
     if interrupt::stop_listening() || matches!(ended, Err(RunError::Interrupted)) {
-        print_error("interrupted: what was finished is kept; the same command goes on from there");
+        print_error(
+            "interrupted: recorded the finished results; run the same command again to resume",
+        );
         return Ok(None);
     }
     ended?;
@@ -165,7 +167,7 @@ fn alternate(
 }
 
 /// The records of one side.
-// Other studies and other builds may have left theirs in the folder.
+// The folder may also have records of other studies and builds.
 fn requested_records(
     contender: &Contender<'_>,
     items: &[Item],

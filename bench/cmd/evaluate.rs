@@ -22,25 +22,23 @@ use crate::study::external::{AxisOptions, read_axis};
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
-    /// Medial meshes (.ma and its dialects, or .ply or .obj with radii), in the units of the surface
-    /// unless `--fit` finds others. Several files give one table.
+    /// Medial meshes (.ma and its dialects, or .ply or .obj with radii) in the units of the surface.
+    /// Several files give one table.
     #[arg(required = true, value_name = "X.ma")]
     axes: Vec<PathBuf>,
     #[command(flatten)]
     fitting: AxisOptions,
-    /// Seed of the samples.
+    /// Set the seed of the samples.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Enclose the Hausdorff distance in an interval of at most this width, as a fraction of the
-    /// diagonal.
+    /// Certify the Hausdorff distance by an interval of at most this width, as a fraction of the diagonal.
     #[arg(long, value_name = "TOL")]
     certify: Option<f64>,
     #[command(flatten)]
     measure: MeasureArguments,
 }
 
-/// Runs the verb. With several files, a file that cannot be read is reported and the others are
-/// evaluated.
+/// Runs the verb. With several files, a file that cannot be read is reported and the others are evaluated.
 ///
 /// # Errors
 /// When the surface or the only medial mesh is refused.
@@ -85,11 +83,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
 struct Evaluated {
     #[serde(flatten)]
     evaluation: Evaluation,
-    /// The change of units that came first, where `--fit` found one.
+    /// The change of units before the evaluation, if `--fit` found one.
     #[serde(skip_serializing_if = "Option::is_none")]
     fit: Option<Fit>,
-    /// How the file was read.
-    // In no JSON, because no number depends on it.
+    /// Notes of the reader.
+    // Not in JSON, because no number depends on them.
     #[serde(skip)]
     notes: Vec<String>,
     /// Defects of the file.

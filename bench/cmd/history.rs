@@ -1,4 +1,4 @@
-//! `medial history DIR`: the results of many runs, and where they changed.
+//! `medial history DIR`: the change points of many runs.
 
 use std::path::PathBuf;
 
@@ -18,19 +18,19 @@ use crate::store::RESULTS;
 pub struct Arguments {
     /// Folder of the history: one file for each run.
     folder: PathBuf,
-    /// Add the results of `medial compare` in STORE as a run first.
+    /// Add the results of `medial compare` in STORE as a run.
     #[arg(long, value_name = "STORE", requires_all = ["commit", "date"])]
     add: Option<PathBuf>,
-    /// Hash of the commit that was measured.
+    /// Set the hash of the measured commit.
     #[arg(long, value_name = "HASH", requires = "add")]
     commit: Option<String>,
-    /// Date of the commit, for example from `git show -s --format=%cI`.
+    /// Set the date of the commit, as printed by `git show -s --format=%cI`.
     #[arg(long, value_name = "DATE", requires = "add")]
     date: Option<String>,
-    /// Write a page, too.
+    /// Write a page.
     #[arg(long, short, value_name = "PAGE.html")]
     output: Option<PathBuf>,
-    /// Least change of seconds or memory that counts, as a share.
+    /// Ignore changes of seconds or memory below this fraction.
     #[arg(long, value_name = "SHARE", value_parser = positive, default_value_t = 0.05)]
     least_step: f64,
 }
@@ -41,13 +41,13 @@ pub struct Arguments {
 /// When the results or the history cannot be read, the run cannot be added, or the page cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let Arguments { folder, output, least_step, .. } = arguments;
-    // Before a run is added, which cannot be taken back.
+    // Before a run is added, which cannot be undone.
     output.as_deref().map_or(Ok(()), files::check_folder)?;
     let (added, mut warnings) = add(arguments)?;
     let (runs, damaged) = read_runs(folder).map_err(Failure::input)?;
-    warnings.extend(damaged.iter().map(|error| format!("left out: {error}")));
+    warnings.extend(damaged.iter().map(|error| format!("skipped: {error}")));
     if runs.is_empty() {
-        let why = warnings.first().map_or("no run in it".to_owned(), Clone::clone);
+        let why = warnings.first().map_or("no runs; add one by --add".to_owned(), Clone::clone);
         let message = format!("{}: {why}", folder.display());
         return Err(Failure { code: Exit::NothingMeasured, message });
     }

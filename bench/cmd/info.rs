@@ -1,7 +1,8 @@
-//! `medial info MESH`: what a mesh is, whether or not it can be used.
+//! `medial info MESH`: counts, defects and topology of a mesh, even of a refused one.
 
 use clap::Args;
 use medial::surface::{self, SurfaceReport};
+use medial_reports::significant;
 
 use crate::args::{Global, MeshArgument};
 use crate::exit::{Exit, Failure};
@@ -15,15 +16,15 @@ pub struct Arguments {
     mesh: MeshArgument,
 }
 
-/// Runs the verb. A mesh that cannot be used is described as far as it goes, and ends in code 1.
+/// Runs the verb. A refused mesh is described as far as possible, with exit code 1.
 ///
 /// # Errors
-/// When nothing can be said of the file.
+/// When the file cannot be read.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh)?;
     let (report, refusal) = match source.path() {
         Some(path) => {
-            // Unlike a reader it goes on at a defect: a defective mesh is the usual reason for this verb.
+            // Unlike a reader it continues at a defect: a defective mesh is the usual reason for this verb.
             let inspection = surface::inspect(path).map_err(Failure::input)?;
             (inspection.report, inspection.refused)
         }
@@ -67,7 +68,7 @@ fn print_report(source: &Source, report: &SurfaceReport) {
         ("oriented", yes(report.oriented).to_owned()),
         ("self-intersections", intersecting),
         ("zero-area faces", report.degenerate_faces.to_string()),
-        ("diagonal", format!("{:.6}", report.diagonal)),
+        ("diagonal", significant(report.diagonal, 4)),
     ];
     for (label, value) in lines {
         print_line(&format!("  {label:<20} {value}"));

@@ -11,7 +11,7 @@ use crate::study::registry::{Entry, Registry};
 /// Arguments of `methods`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Describe this method alone.
+    /// Describe this method.
     id: Option<String>,
 }
 

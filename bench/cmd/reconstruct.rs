@@ -11,6 +11,7 @@ use medial::metrics::union_betti;
 use medial::shape::Shape;
 use medial::surface::{Normalisation, SurfaceReport, TriMesh};
 use medial::{Vec3, complex, surface};
+use medial_reports::significant;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -25,22 +26,21 @@ use crate::study::external::{AxisOptions, FitBy, RadiiFrom, percent, read_axis};
 /// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Medial mesh (.ma, or .ply with radii). The power crust can do without one: it then takes all
-    /// inner poles of the mesh.
+    /// Medial mesh (.ma, or .ply with radii) [default for the power crust: all inner poles of the surface].
     axis: Option<PathBuf>,
-    /// The surface (.ply, .off, .obj), in the units of the medial mesh.
+    /// Write the surface (.ply, .off, .obj) in the units of the medial mesh.
     #[arg(short, long)]
     output: PathBuf,
-    /// What is made of the spheres.
+    /// Compute this kind of surface.
     #[arg(long, value_enum, default_value_t = Method::Union)]
     method: Method,
-    /// Surface that the medial mesh is of: a file, or `builtin:ID[:RESOLUTION]`. The power crust
-    /// takes its outer poles; either result is measured against it.
+    /// Measure the result against the original surface, a file or `builtin:ID[:RESOLUTION]`. The
+    /// power crust requires it for its outer poles.
     #[arg(long, value_name = "MESH")]
     mesh: Option<MeshArgument>,
-    /// How far the surface may be from the boundary of the union, as a fraction of the diagonal of
-    /// the mesh, or of the box around the spheres without one [default: the coarsest of 0.04, 0.02 and
-    /// 0.01 that shows the union's topology, with all faces within 0.005].
+    /// Limit the distance to the boundary of the union, as a fraction of the diagonal of the original
+    /// surface, or else of the spheres' box [default: the coarsest of 0.04, 0.02 and 0.01 with the
+    /// union's topology, with all faces within 0.005].
     #[arg(long, value_name = "FRACTION", value_parser = fraction)]
     tolerance: Option<f64>,
     #[command(flatten)]
@@ -49,7 +49,7 @@ pub struct Arguments {
     substrate: SubstrateArguments,
 }
 
-/// What is made of the spheres.
+/// The kind of reconstruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "kebab-case")]
 enum Method {
@@ -59,10 +59,10 @@ enum Method {
     PowerCrust,
 }
 
-/// A result farther from the mesh than this, in its diagonals, is taken to be of another surface.
+/// A result farther from the mesh than this, in its diagonals, is probably of another surface.
 const ASTRAY: f64 = 0.5;
 
-/// A surface that was made, in input units, and the facts about it.
+/// A reconstructed surface in input units, with its diagnostics.
 struct Made {
     mesh: TriMesh,
     diagonal: f64,
@@ -70,7 +70,7 @@ struct Made {
     tolerance: f64,
     /// Betti numbers of the union, where they are known.
     union: Option<[u64; 3]>,
-    /// Keys of this method alone.
+    /// JSON keys of this method only.
     more: Value,
     warnings: Vec<String>,
 }
@@ -78,21 +78,18 @@ struct Made {
 /// Runs the verb.
 ///
 /// # Errors
-/// When an input is refused, the power crust has no mesh, the tolerance is too fine, or the output
-/// cannot be written.
+/// When an input is refused, the power crust has no mesh, the tolerance is too fine, or the output cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let Arguments { axis, output, method, mesh: of, .. } = arguments;
     check_extension(output, &SURFACES)?;
     check_folder(output)?;
     match method {
         Method::Union if axis.is_none() => {
-            let why =
-                "the union is that of a medial mesh: name one, or ask for --method power-crust";
+            let why = "the union requires a medial mesh; name one, or give --method power-crust";
             return Err(Failure::usage(why));
         }
         Method::PowerCrust if of.is_none() => {
-            let why = "the power crust takes its outer poles from a surface: name it by --mesh MESH, or ask \
-                       for --method union";
+            let why = "the power crust requires a surface for its outer poles; give --mesh MESH, or --method union";
             return Err(Failure::usage(why));
         }
         _ => {}
@@ -121,8 +118,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         && max > ASTRAY
     {
         warnings.push(format!(
-            "the result is up to {max:.1} diagonals of the mesh away from it: is {} of this surface, and in \
-             its units?",
+            "the result is up to {max:.1} diagonals away from the mesh; check surface and units of {}",
             axis.display()
         ));
     }
@@ -157,7 +153,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     Ok(print_result(global, &object, &text, &warnings))
 }
 
-/// The shape and the medial mesh, in its own units, where they are named, and what was repaired.
+/// The shape, the medial mesh in the units of its file, if they are named, and notes on repairs.
 type Read = (Option<Shape>, Option<MedialMesh>, Vec<String>);
 
 fn read(arguments: &Arguments) -> Result<Read, Failure> {
@@ -181,13 +177,13 @@ fn read(arguments: &Arguments) -> Result<Read, Failure> {
     Ok((shape, axis, warnings))
 }
 
-/// A medial mesh, where there is no surface to take units and radii from.
+/// A medial mesh without a surface for units and radii.
 fn without_surface(path: &Path, fitting: AxisOptions) -> Result<LoadedMa, Failure> {
-    for (is_asked, option) in
+    for (is_set, option) in
         [(fitting.fit != FitBy::None, "--fit"), (fitting.radii != RadiiFrom::File, "--radii")]
     {
-        if is_asked {
-            return Err(Failure::usage(format!("{option} needs the surface: name it with --mesh")));
+        if is_set {
+            return Err(Failure::usage(format!("{option} requires the surface; give --mesh MESH")));
         }
     }
     complex::read_with(path, fitting.read_options()).map_err(Failure::input)
@@ -197,7 +193,7 @@ fn face_centres(mesh: &TriMesh) -> Vec<Vec3> {
     (0..mesh.faces.len()).map(|f| mesh.triangle(f).into_iter().sum::<Vec3>() / 3.0).collect()
 }
 
-/// What `medial info` says of the file that was written; of what is no file, the mesh itself.
+/// The report of `medial info` on the written file, or on the mesh if the output is a device or pipe.
 fn examine(
     path: &Path,
     mesh: &TriMesh,
@@ -218,14 +214,14 @@ fn betti_of(report: &SurfaceReport) -> Option<[u64; 3]> {
     Some(report.expected_betti?.map(|b| b as u64))
 }
 
-/// What is to be said where a surface has not the Betti numbers of the union.
+/// A warning for a surface without the Betti numbers of the union.
 fn other_topology(union: [u64; 3], report: &SurfaceReport) -> Option<String> {
     // An open surface bounds no solid and has no such numbers.
     let found = betti_of(report)?;
     (found != union).then(|| {
         format!(
-            "the surface has Betti numbers {found:?}, the union of the primitives {union:?}: crevices, \
-             holes or necks are narrower than --tolerance shows; ask for a finer one"
+            "the surface has other Betti numbers than the union (found {found:?}, expected {union:?}): it \
+             lacks narrow crevices, holes or necks; give a smaller --tolerance"
         )
     })
 }
@@ -267,7 +263,7 @@ fn power_crust_of(
     if crust.mesh.faces.is_empty() {
         return Err(Failure::at(
             named,
-            "no inner ball has a power cell: is the medial mesh of this surface, and in its units?",
+            "no inner ball has a power cell; check surface and units of the medial mesh",
         ));
     }
     crust.mesh.vertices.iter_mut().for_each(|vertex| *vertex = to_normal.backward(*vertex));
@@ -280,16 +276,16 @@ fn power_crust_of(
     Ok(Made { mesh: crust.mesh, diagonal, tolerance, union: None, more, warnings: vec![] })
 }
 
-/// Balls that stand for the union where its topology is asked are so far apart, in tolerances.
+/// Spacing of the balls that replace the union for its topology, in tolerances.
 const BALL_SPACING: f64 = 0.5;
 
-/// Tolerances that are tried first where none is asked for.
+/// The first tolerances without `--tolerance`.
 const COARSE: [f64; 2] = [0.04, 0.02];
 
-/// The tolerance where these show too little.
+/// The last tolerance without `--tolerance`.
 const FINE: f64 = 0.01;
 
-/// Faces of a surface that was made without asking for a tolerance are this near to the union.
+/// Without `--tolerance`, all faces are within this distance of the union, in diagonals.
 const FACES_WITHIN: f64 = 0.005;
 
 /// The boundary of the union of spheres, cones and slabs.
@@ -305,10 +301,9 @@ fn union_surface_of(
     let corners = TriMesh { vertices: vec![lo, hi], faces: vec![] };
     let diagonal = shape.map(|s| s.normalisation().diagonal);
     // Without a surface the box of the union gives the unit of the tolerance.
-    let diagonal =
-        diagonal.or_else(|| Normalisation::of(&corners).map(|n| n.diagonal)).ok_or_else(|| {
-            Failure::at(path, "its spheres have no extent, or one that is not finite")
-        })?;
+    let diagonal = diagonal
+        .or_else(|| Normalisation::of(&corners).map(|n| n.diagonal))
+        .ok_or_else(|| Failure::at(path, "the extent of the spheres is zero or not finite"))?;
     let made = stages
         .timed("reconstruct", || fitting_surface(axis, &union, diagonal, arguments.tolerance));
     let Fitting { made, tolerance, off, betti } =
@@ -316,8 +311,8 @@ fn union_surface_of(
     let mut warnings = Vec::new();
     if made.lost > 0 {
         warnings.push(format!(
-            "{} with a radius below {:.1e} of the diagonal: where the union is as thin, parts of it may be \
-             missing; a finer --tolerance shows more",
+            "{} with a radius below {:.1e} of the diagonal: thin parts of the union may be missing; give a \
+             smaller --tolerance",
             counted(made.lost as u64, "sphere"),
             made.smallest / diagonal
         ));
@@ -336,22 +331,22 @@ pub struct Fitting {
     pub tolerance: f64,
     /// Largest distance of a face's centre from the union, in diagonals.
     pub off: f64,
-    /// Betti numbers of the union, where there are not too many balls to tell.
+    /// Betti numbers of the union; `None` for too many balls.
     pub betti: Option<[u64; 3]>,
 }
 
-/// The surface of a union at a tolerance in diagonals, or at the coarsest that shows what there is.
+/// The surface of a union at a tolerance in diagonals, or at the coarsest with the right topology.
 ///
 /// # Errors
-/// When the tolerance is too fine or too coarse for this union: which one would do.
+/// When the tolerance is too fine or too coarse for this union, with a feasible one.
 pub fn fitting_surface(
     axis: &MedialMesh,
     union: &MedialUnion,
     diagonal: f64,
-    asked: Option<f64>,
+    tolerance: Option<f64>,
 ) -> Result<Fitting, ContourError> {
-    let finest = asked.unwrap_or(FINE);
-    // There may be too many balls to tell.
+    let finest = tolerance.unwrap_or(FINE);
+    // Fails for too many balls.
     let betti = union_betti(axis, BALL_SPACING * finest * diagonal).ok();
     let at = |tolerance: f64| -> Result<Fitting, ContourError> {
         let made = union_surface(axis, tolerance * diagonal)?;
@@ -363,7 +358,7 @@ pub fn fitting_surface(
         let found = surface::validate(&fitting.made.mesh).ok().and_then(|report| betti_of(&report));
         fitting.off <= FACES_WITHIN && found.is_some() && found == betti
     };
-    let coarse = if asked.is_none() { &COARSE[..] } else { &[] };
+    let coarse = if tolerance.is_none() { &COARSE[..] } else { &[] };
     // Coarse first: each halving costs eight times the cells.
     for &tolerance in coarse {
         match at(tolerance) {
@@ -378,13 +373,12 @@ pub fn fitting_surface(
 fn contour_error(error: ContourError, diagonal: f64) -> String {
     match error {
         ContourError::TooFine { tolerance, most, feasible } => format!(
-            "--tolerance {} needs more than {most} tetrahedra, or finer ones than there are; \
-             --tolerance {:.1e} is feasible",
-            tolerance / diagonal,
+            "--tolerance {} is too fine (more than {most} tetrahedra); give --tolerance {:.1e}",
+            significant(tolerance / diagonal, 4),
             feasible / diagonal
         ),
         ContourError::TooThin { feasible, .. } => format!(
-            "no sphere is thick enough to show; --tolerance {:.1e} would show the largest",
+            "every sphere is too thin for this tolerance; give --tolerance {:.1e} for the largest",
             feasible / diagonal
         ),
         other => other.to_string(),

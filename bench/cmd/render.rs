@@ -27,46 +27,46 @@ use crate::study::external::{AxisOptions, read_axis};
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
-    /// Medial meshes of it (.ma or .ply with radii). Several give a strip: a panel for each, from the same camera.
+    /// Medial meshes (.ma or .ply with radii). Several give a strip with one panel for each.
     axes: Vec<PathBuf>,
-    /// The picture (.png).
+    /// Write the picture (.png).
     #[arg(short, long)]
     output: PathBuf,
-    /// What is drawn [default: `axis`, `surface` without a medial mesh]. `error` with several medial meshes: both the
-    /// medial meshes and, below, their reconstructions.
+    /// Draw this [default: `axis`, or `surface` without a medial mesh].
     #[arg(long, value_enum)]
     show: Option<Show>,
-    /// What a medial mesh is coloured by.
+    /// Colour medial meshes by this.
     #[arg(long, alias = "colour", value_enum, default_value_t = Colour::Radius)]
     color: Colour,
-    /// `front`, `back`, `left`, `right`, `top`, `bottom`, `iso`, AZIMUTH,ELEVATION in degrees, or X,Y,Z from the shape to
-    /// the eye [default: the direction that shows most of the shape].
+    /// Look from `front`, `back`, `left`, `right`, `top`, `bottom`, `iso`, AZIMUTH,ELEVATION in degrees, or direction
+    /// X,Y,Z [default: the direction that shows most of the shape].
     #[arg(long, value_name = "VIEW", allow_hyphen_values = true, value_parser = view)]
     camera: Option<View>,
-    /// Upward direction: `x`, `y`, `z`, `-x`, `-y`, `-z` or X,Y,Z [default: `y`, `z` for shapes that are flat along `y`].
+    /// Set the upward direction: `x`, `y`, `z`, `-x`, `-y`, `-z` or X,Y,Z [default: `y`, or `z` for shapes that are flat
+    /// along `y`].
     #[arg(long, value_name = "DIRECTION", allow_hyphen_values = true, value_parser = upwards)]
     up: Option<Vec3>,
-    /// 1: the shape fills the picture; 2: twice as large.
+    /// Enlarge the shape by this factor; 1 fills the picture.
     #[arg(long, default_value_t = 1.0)]
     zoom: f64,
-    /// Pixels of the picture, of a strip's panel.
+    /// Set the pixels of each panel.
     #[arg(long, value_name = "WxH", default_value = "800x600", value_parser = size)]
     size: [usize; 2],
-    /// `white`, `black`, `transparent` or `#rrggbb`.
+    /// Set the background: `white`, `black`, `transparent` or `#rrggbb`.
     #[arg(long, value_name = "COLOUR", default_value = "white", value_parser = background)]
     background: Background,
-    /// The end of the scale of errors, as a fraction of the diagonal; larger errors have its last colour [default: 90 %
-    /// of the errors are within it, of several medial meshes by the better half].
+    /// End the colour scale of errors here, as a fraction of the diagonal [default: covers 90 % of the errors, of several
+    /// medial meshes those of the better half].
     #[arg(long, value_name = "FRACTION", value_parser = fraction)]
     max_error: Option<f64>,
-    /// Largest distance of a reconstruction from the boundary of the union, as a fraction of the diagonal.
+    /// Limit the distance of a reconstruction to the boundary of the union, as a fraction of the diagonal.
     #[arg(long, value_name = "FRACTION", default_value_t = 0.01, value_parser = fraction)]
     tolerance: f64,
     #[command(flatten)]
     fitting: AxisOptions,
 }
 
-/// What is drawn.
+/// The content of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Show {
     /// The surface.
@@ -75,12 +75,12 @@ enum Show {
     Axis,
     /// The boundary of the union of the spheres, cones and slabs.
     Reconstruction,
-    /// The same, coloured by its distance to the surface: red outside, blue inside. Missing parts of the surface are
-    /// glass.
+    /// The reconstruction coloured by its distance to the surface: red outside, blue inside, glass where parts are
+    /// missing. Several medial meshes are drawn above their reconstructions.
     Error,
 }
 
-/// What a medial mesh is coloured by.
+/// The quantity behind the colours of a medial mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Colour {
     /// The radii of the spheres.
@@ -101,9 +101,9 @@ impl From<Colour> for ColourBy {
 /// Runs the verb.
 ///
 /// # Errors
-/// When an input is rejected, an option is not understood, or the picture cannot be written.
+/// When an input is refused, an option is invalid, or the picture cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
-    // All options are checked before anything is read.
+    // All options are checked before the first file is read.
     check_extension(&arguments.output, &["png"])?;
     check_folder(&arguments.output)?;
     let show = show(arguments)?;
@@ -120,7 +120,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
 /// JSON. `words` are options of the verb; names are captions.
 ///
 /// # Errors
-/// When an option is not understood, or a reconstruction cannot be made.
+/// When an option is invalid, or a reconstruction fails.
 pub fn draw(
     words: Vec<String>,
     shape: Shape,
@@ -164,7 +164,7 @@ fn drawn(
     at("making the reconstructions");
     let mut deviations = vec![];
     if matches!(show, Show::Error | Show::Reconstruction) {
-        // What `evaluate` measures by default: the drawn vertices are fewer and give another number.
+        // As in `evaluate` by default: the drawn vertices are fewer and would give another number.
         let judge = (show == Show::Error).then(|| read.shape.judge(None, JudgeOptions::default()));
         let judge = judge.transpose().map_err(|error| Failure::at(&arguments.mesh, error))?;
         for (path, axis) in arguments.axes.iter().zip(&read.axes) {
@@ -177,7 +177,7 @@ fn drawn(
     }
     at("drawing");
     let (picture, drawing) = Cost::of(|| match read.axes.len() {
-        // A single picture has room for a bar of colours, a strip has one scale for all.
+        // A single picture has a colour bar, and a strip has one scale for all panels.
         0 | 1 => single(arguments, show, read, camera, deviations.first()),
         _ => side_by_side(arguments, read, camera, &deviations),
     });
@@ -200,13 +200,13 @@ fn drawn(
     Ok(Drawn { png, object, text })
 }
 
-/// What is drawn, as far as there are medial meshes for it.
+/// The content of the picture, which must fit the number of medial meshes.
 fn show(arguments: &Arguments) -> Result<Show, Failure> {
     let (show, problem) = match (arguments.show, arguments.axes.len()) {
         (None, 0) => return Ok(Show::Surface),
         (None, _) => return Ok(Show::Axis),
         (Some(show), 0) if show != Show::Surface => {
-            (show, ": name a medial mesh after the surface")
+            (show, ": no medial mesh; name one after the surface")
         }
         (Some(show @ (Show::Surface | Show::Reconstruction)), 2..) => {
             (show, " with several medial meshes: expected axis or error")
@@ -254,7 +254,7 @@ fn side_by_side(
     for (k, axis) in read.axes.iter().enumerate() {
         let count = counted(axis.spheres.len() as u64, "sphere");
         let caption = format!("{}, {count}", read.names[k]);
-        // Panels differ by file name and count alone.
+        // Panels differ only by file name and count.
         panels.push(Panel { axis, caption, errors: deviations.get(k).map(Deviation::errors) });
     }
     let common = Strip {
@@ -295,7 +295,7 @@ fn single(
         _ => (vec![Layer::Surface(surface)], None),
     };
     let Arguments { size, background, .. } = *arguments;
-    // On a picture as small as an icon nothing would be left beside it.
+    // A picture as small as an icon has no room for a bar.
     let bar = bar.filter(|_| 2 * Bar::column(size) <= size[0]);
     let column = if bar.is_some() { Bar::column(size) } else { 0 };
     let frame = Frame::fit(&camera, &surface.vertices)?;
@@ -333,10 +333,10 @@ impl Deviation {
         let path = path.display();
         let mesh = union_surface(axis, tolerance).map_err(|error| match error {
             ContourError::TooFine { tolerance, feasible, .. } => Failure::usage(format!(
-                "--tolerance {tolerance} is too fine for {path}; {feasible:.1e} is feasible"
+                "--tolerance {tolerance} is too fine for {path}; give --tolerance {feasible:.1e}"
             )),
             ContourError::TooThin { feasible, .. } => Failure::usage(format!(
-                "--tolerance {tolerance}: no sphere of {path} is thick enough to show; {feasible:.1e} would show \
+                "--tolerance {tolerance}: every sphere of {path} is too thin; give --tolerance {feasible:.1e} for \
                  the largest"
             )),
             other => Failure::input(format!("{path}: {other}")),
@@ -368,7 +368,7 @@ impl Deviation {
 }
 
 /// Named views: azimuth and elevation in degrees.
-// The top and the bottom are a little off, since the upward direction must not lie along the line of sight.
+// Top and bottom are slightly tilted, since the upward direction must not lie along the line of sight.
 const VIEWS: [(&str, f64, f64); 7] = [
     ("front", 0.0, 0.0),
     ("right", 90.0, 0.0),
@@ -379,7 +379,7 @@ const VIEWS: [(&str, f64, f64); 7] = [
     ("iso", 45.0, 35.264),
 ];
 
-/// Where the camera stands.
+/// Direction of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum View {
     /// Azimuth and elevation in degrees.
@@ -411,7 +411,7 @@ fn view(text: &str) -> Result<View, String> {
         }
         Some(&[x, y, z]) => Ok(View::Direction(Vec3::new(x, y, z))),
         _ => Err(format!(
-            "write one of {}, or AZIMUTH,ELEVATION in degrees with an elevation between -90 and 90, \
+            "expected one of {}, or AZIMUTH,ELEVATION in degrees with an elevation between -90 and 90, \
              or a direction X,Y,Z from the shape to the eye",
             VIEWS.map(|view| view.0).join(", ")
         )),
@@ -437,7 +437,7 @@ fn upwards(text: &str) -> Result<Vec3, &'static str> {
             _ => None,
         },
     };
-    axis.ok_or("write x, y, z, -x, -y, -z or a direction X,Y,Z")
+    axis.ok_or("expected x, y, z, -x, -y, -z or a direction X,Y,Z")
 }
 
 /// Width and height from `WxH`.
@@ -445,7 +445,7 @@ fn size(text: &str) -> Result<[usize; 2], &'static str> {
     let sides = text.split_once(['x', 'X']).and_then(|(width, height)| {
         Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
     });
-    sides.ok_or("write WIDTHxHEIGHT in pixels, such as 800x600")
+    sides.ok_or("expected WIDTHxHEIGHT in pixels, for example 800x600")
 }
 
 /// The background by name or code.
@@ -455,14 +455,14 @@ fn background(text: &str) -> Result<Background, &'static str> {
         "black" => Some(Background::Colour([0; 3])),
         "transparent" => Some(Background::Transparent),
         _ => text.strip_prefix('#').and_then(|hex| {
-            // The parser alone would take a sign for a digit.
+            // The parser also accepts a sign.
             let is_hex = hex.len() == 6 && hex.bytes().all(|b| b.is_ascii_hexdigit());
             let code = is_hex.then(|| u32::from_str_radix(hex, 16).ok()).flatten()?;
             let [_, colour @ ..] = code.to_be_bytes();
             Some(Background::Colour(colour))
         }),
     };
-    found.ok_or("write white, black, transparent or #rrggbb")
+    found.ok_or("expected white, black, transparent or #rrggbb")
 }
 
 #[cfg(test)]

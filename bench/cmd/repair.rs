@@ -1,4 +1,4 @@
-//! `medial repair IN -o OUT`: a surface that bounds a solid, from one that nearly does.
+//! `medial repair IN -o OUT`: repairs a surface that nearly bounds a solid.
 
 use std::path::PathBuf;
 
@@ -16,26 +16,26 @@ use crate::output::print_result;
 pub struct Arguments {
     /// Surface (OFF, OBJ, PLY, STL).
     input: PathBuf,
-    /// The repaired surface (OFF, OBJ, PLY).
+    /// Write the repaired surface (OFF, OBJ, PLY).
     #[arg(short, long)]
     output: PathBuf,
     /// Close holes of up to 500 edges by triangles between their vertices.
     #[arg(long)]
     fill_holes: bool,
-    /// Draw parts back from vertices in which they touch, by a thousandth of their faces there.
+    /// Separate parts that touch in a vertex, by a thousandth of the size of their faces.
     #[arg(long)]
     separate: bool,
-    /// Which parts to keep.
+    /// Keep these parts.
     #[arg(long, value_enum, default_value_t = Keep::All)]
     components: Keep,
 }
 
-/// Which parts to keep.
+/// Parts of the result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Keep {
-    /// The one of the largest area.
+    /// The part with the largest area.
     Largest,
-    /// All of them.
+    /// All parts.
     All,
 }
 
@@ -51,10 +51,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     };
     let Arguments { fill_holes, separate, .. } = *arguments;
     let options = MendOptions { fill_holes, separate, components };
-    let mended = surface::mend(&arguments.input, options).map_err(Failure::input)?;
-    // Only a solid comes this far: a surface that is still refused is an error above.
-    surface::write(&arguments.output, &mended.mesh).map_err(Failure::input)?;
-    let report = mended.report;
+    // An error unless the repaired surface bounds a solid.
+    let repaired = surface::mend(&arguments.input, options).map_err(Failure::input)?;
+    surface::write(&arguments.output, &repaired.mesh).map_err(Failure::input)?;
+    let report = repaired.report;
     let object = json!({
         "output": arguments.output, "vertices": report.vertices, "faces": report.faces,
         "components": report.components, "genus": report.genus, "repairs": report.repairs,

@@ -25,7 +25,7 @@ pub struct Arguments {
     /// Stores: folders with `results.jsonl`.
     #[arg(required = true, value_name = "DIR")]
     dirs: Vec<PathBuf>,
-    /// Store that the others are merged into; needed for several.
+    /// Merge the stores into this folder; required for several stores.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -33,17 +33,18 @@ pub struct Arguments {
 /// Runs the verb.
 ///
 /// # Errors
-/// When the folder has no readable records, another process adds to it, or the report cannot be
-/// written.
+/// When the folder has no readable records, another process adds to it, or the report cannot be written.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let (dir, notes) = match (&arguments.dirs[..], &arguments.out) {
         ([dir], None) => (dir, Vec::new()),
         (_, None) => {
-            return Err(Failure::usage("several stores: name the merged one by --out DIR"));
+            return Err(Failure::usage(
+                "several stores: no folder for the merged one; give --out DIR",
+            ));
         }
         (dirs, Some(out)) => (out, merge(dirs, out)?),
     };
-    // While records are being added, no page would match them.
+    // While another process adds records, a page would be outdated at once.
     let held = dir.is_dir().then(|| Store::open(dir, RESULTS, "medial report")).transpose()?;
     let Rebuilt { records, files, mut warnings, undrawn } = rebuild(dir, registry)?;
     warnings.extend(undrawn);
@@ -62,11 +63,11 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
 }
 
 /// Merges stores into `out`: records with their medial meshes, the study, the notes of the runs. Of
-/// records of the same key the first counts if they are equal but for seconds, else the one of the
-/// store that was written last. Returns a remark for each such difference.
+/// records with the same key, the first counts if they differ only in seconds, else the one of the
+/// newest store. Returns a remark for each such difference.
 fn merge(dirs: &[PathBuf], out: &Path) -> Result<Vec<String>, Failure> {
     let mut stores = Vec::new();
-    // What stands in `out` already takes part like another store.
+    // Records in `out` take part like another store.
     let earlier = out.join(RESULTS).exists().then(|| out.to_owned());
     for dir in earlier.iter().chain(dirs) {
         let (records, mut bad) = records(dir)?;
@@ -82,7 +83,7 @@ fn merge(dirs: &[PathBuf], out: &Path) -> Result<Vec<String>, Failure> {
     for (dir, written, records, bad) in stores {
         notes.extend(bad);
         for record in records {
-            // Records of older builds have no key and cannot be told apart.
+            // Records of older builds have no key and cannot be matched.
             let known = places.get(&record.key).copied().filter(|_| !record.key.is_empty());
             let Some(place) = known else {
                 places.insert(record.key.clone(), merged.len());
@@ -98,7 +99,7 @@ fn merge(dirs: &[PathBuf], out: &Path) -> Result<Vec<String>, Failure> {
                     let newer = written > *other_written;
                     let taken = if newer { dir } else { *other_dir };
                     notes.push(format!(
-                        "{}, {}, {}: {} and {} differ; the newer one, of {}, is taken",
+                        "{}, {}, {}: {} and {} differ; took the newer record, of {}",
                         record.mesh,
                         record.simplify.variant.as_ref().unwrap_or(&record.simplify.method),
                         record.simplify.level,
@@ -114,26 +115,26 @@ fn merge(dirs: &[PathBuf], out: &Path) -> Result<Vec<String>, Failure> {
             }
         }
     }
-    // After all stores were read: a wrong folder must not leave an empty store behind.
+    // After all stores were read: a wrong folder must not leave an empty store.
     let store = Store::open(out, RESULTS, "medial report")?;
     for (record, dir, _) in merged.iter().filter(|(_, dir, _)| dir.as_path() != out) {
         let Some(artifact) = record.artifact.as_deref() else { continue };
-        // Names hold the key, so that two stores cannot mean different results by one name.
+        // Names contain the key: the same name in two stores is the same result.
         let [from, to] = [dir.as_path(), out].map(|store| artifact_path(store, artifact));
         let (Some(from), Some(to)) = (from.filter(|path| path.is_file()), to) else {
             let dir = dir.display();
-            notes.push(format!("{dir}: {artifact}: no medial mesh of this folder; left out"));
+            notes.push(format!("{dir}: {artifact}: missing or not inside the folder; not merged"));
             continue;
         };
         let bytes = fs::read(&from).map_err(|error| Failure::at(&from, error))?;
         fs::create_dir_all(to.parent().unwrap_or(out)).map_err(|error| Failure::at(&to, error))?;
         files::write(&to, &bytes)?;
     }
-    // The first store's study stands for all; relative paths in it start at the folder it names.
+    // The merged store gets the first study; its relative paths start at the folder that it names.
     let studies: Vec<(&PathBuf, Study)> = (earlier.iter().chain(dirs))
         .filter_map(|dir| {
             let mut study = Study::read(&dir.join(STUDY)).ok()?;
-            // A study that names no folder reads as one of the folder that holds it.
+            // A study without a folder is read with the folder of its file.
             study.folder = study
                 .folder
                 .take()
@@ -144,7 +145,7 @@ fn merge(dirs: &[PathBuf], out: &Path) -> Result<Vec<String>, Failure> {
     if let Some((first, study)) = studies.first() {
         for (dir, _) in studies.iter().filter(|(_, other)| other != study) {
             let (dir, first) = (dir.display(), first.display());
-            notes.push(format!("{dir}: its study differs; that of {first} is kept"));
+            notes.push(format!("{dir}: another study; took that of {first}"));
         }
         write_study(out, study)?;
     }

@@ -12,7 +12,7 @@ use medial::{complex, surface};
 use medial_methods::aof::LatticeVoxels;
 use medial_methods::tam_heidrich::{OuterPoles, PartInfo, RemainingPoles};
 use medial_methods::{aof, tam_heidrich};
-use medial_reports::{Simplify, Status, file_stem};
+use medial_reports::{Simplify, Status, file_stem, significant};
 use serde::Serialize;
 use serde_json::json;
 
@@ -35,22 +35,22 @@ use crate::study::source::Input;
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
-    /// Id of the method; `medial methods` lists them.
+    /// Run the method with this id; list the ids by `medial methods`.
     #[arg(long, short, value_name = "ID")]
     method: String,
-    /// Number of spheres.
+    /// Simplify to N spheres.
     #[arg(long, value_name = "N", conflicts_with_all = ["level", "max_error"])]
     spheres: Option<usize>,
-    /// The method's own level, in its own unit.
+    /// Simplify to native level X, in the unit of the method.
     #[arg(long, value_name = "X", conflicts_with = "max_error", allow_negative_numbers = true)]
     level: Option<f64>,
-    /// As few spheres as keep the symmetric Hausdorff error within this fraction of the diagonal.
+    /// Search the fewest spheres with a symmetric Hausdorff error of at most E, a fraction of the diagonal.
     #[arg(long, value_name = "E", value_parser = error_bound)]
     max_error: Option<f64>,
-    /// Hold that bound by a certificate, not by samples alone.
+    /// Prove the error bound by a certificate instead of samples.
     #[arg(long, requires = "max_error")]
     certify: bool,
-    /// Set a parameter of the method; can be given several times.
+    /// Set a parameter of the method; repeatable.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
     set: Vec<(String, String)>,
     /// Start from this medial mesh instead of the Voronoi one.
@@ -73,7 +73,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let entry = method(registry, &arguments.method)?;
     let options = arguments.substrate.shape_options()?;
-    // All slips that show without the mesh are refused before it is read.
+    // Errors that need no mesh are reported before it is read.
     arguments.outputs.check(entry.method())?;
     let line = StageLine::new(global.stages());
     line.at("reading");
@@ -81,7 +81,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     if arguments.outputs.is_empty() && !global.json {
         let example = format!("{}-{}.ma", file_stem(&input.name), arguments.method);
         return Err(Failure::usage(format!(
-            "the result would be lost: write it with -o {example}, or print its figures with --json"
+            "no output: write the result with -o {example}, or print its figures with --json"
         )));
     }
     let mut warnings = input.report.warnings.clone();
@@ -133,17 +133,20 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     Ok(Exit::Done)
 }
 
-/// What is to be said where the result, or what it was made from, has not the solid's topology.
+/// Warnings for a result, and its initial medial mesh, without the solid's topology.
 fn topology_warnings(result: &MedialMesh, shape: &Shape) -> Vec<String> {
     let expected = shape.expected_betti();
-    // The start is only looked at where the result is wrong: its topology takes longer.
+    // The topology of the initial medial mesh takes longer: only for wrong results.
     let Some(own) = topology_warning(complex::betti(result), expected) else { return Vec::new() };
     let initial = shape.initial().ok();
     let start = initial.and_then(|initial| topology_warning(complex::betti(&initial), expected));
     let start = start.map(|start| {
         format!("the initial medial mesh is not right either ({start}); `--sampling auto` adds samples where it fails")
     });
-    [Some(format!("the topology is not the solid's: {own}")), start].into_iter().flatten().collect()
+    [Some(format!("the topology differs from the solid's: {own}")), start]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// The list of parts with their centres as in the input.
@@ -157,7 +160,7 @@ fn in_input_units(parts: &[PartInfo], shape: &Shape) -> serde_json::Result<serde
 }
 
 impl Arguments {
-    /// Runs the method at the level that is asked, or at the one that a search finds.
+    /// Runs the method at the requested level, or at the one that a search finds.
     fn run(
         &self,
         entry: &Entry,
@@ -186,11 +189,11 @@ impl Arguments {
         let judge = judge.map_err(|error| self.failure(SimplifyError::from(error).into()))?;
         let measure = |mesh: &MedialMesh| -> Result<f64, String> {
             let sampled = judge.distances(mesh).map_err(|error| error.to_string())?.hausdorff;
-            // Samples are a lower bound: what they refuse needs no certificate.
+            // Samples are a lower bound: above the error bound, no certificate is needed.
             if !self.certify || sampled > bound {
                 return Ok(sampled);
             }
-            // An upper end within the bound needs an interval that is narrow beside it.
+            // An upper end within the bound needs an interval much narrower than the bound.
             let certified = judge.certify(mesh, CERTIFIED_SHARE * bound);
             Ok(certified.map_err(|error| error.to_string())?.upper)
         };
@@ -239,7 +242,7 @@ fn print_result(simplify: &Simplify, search: Option<&Searched>, arguments: &Argu
         seconds.simplify
     ));
     if let Some(level) = simplify.native_level {
-        print_line(&format!("  native level {level}"));
+        print_line(&format!("  native level {}", significant(level, 4)));
     }
     if let Some(search) = search {
         print_line(&format!(
@@ -252,7 +255,7 @@ fn print_result(simplify: &Simplify, search: Option<&Searched>, arguments: &Argu
     arguments.outputs.written().iter().for_each(|line| print_line(&format!("  {line}")));
 }
 
-/// What a search over sphere counts found, for the answer to `--max-error`.
+/// The result of a search for `--max-error`, for JSON.
 #[derive(Debug, Serialize)]
 struct Searched {
     /// The bound, a fraction of the diagonal.
@@ -271,13 +274,12 @@ struct Searched {
 const CERTIFIED_SHARE: f64 = 0.05;
 
 /// Reads a bound.
-// The whole solid is within one diagonal of anything inside it, so that 1 and more are a slip.
+// The whole solid is within one diagonal of each of its points, so that 1 and more are implausible.
 fn error_bound(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(bound) if bound > 0.0 && bound < 1.0 => Ok(bound),
         Ok(bound) if bound >= 1.0 && bound.is_finite() => Err(format!(
-            "a fraction of the diagonal is meant, and this is {} % of it; write {} for {bound} %",
-            100.0 * bound,
+            "expected a fraction of the diagonal below 1; write {} for {bound} %",
             bound / 100.0
         )),
         _ => Err("expected a positive fraction of the diagonal".to_owned()),
@@ -287,17 +289,16 @@ fn error_bound(text: &str) -> Result<f64, String> {
 /// Files to write.
 #[derive(Debug, Args)]
 struct Outputs {
-    /// The result (.ma, .ply, .obj, .vtp, .glb), in the units of the surface.
+    /// Write the result (.ma, .ply, .obj, .vtp, .glb) in the units of the surface.
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Write the voxels with their distance and flux (.csv), for methods on a lattice.
     #[arg(long, value_name = "FILE")]
     voxels: Option<PathBuf>,
-    /// Write the power crust of the poles that are left (.ply, .off, .obj), for methods that prune
-    /// by parts.
+    /// Write the power crust of the remaining poles (.ply, .off, .obj), for methods that prune by parts.
     #[arg(long, value_name = "FILE")]
     power_crust: Option<PathBuf>,
-    /// Outer poles that this power crust takes.
+    /// Build the power crust from these outer poles.
     #[arg(long, value_enum, default_value_t = Outer::All, requires = "power_crust")]
     outer_poles: Outer,
 }
@@ -305,17 +306,17 @@ struct Outputs {
 /// Outer poles of a power crust.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Outer {
-    /// Those of all samples.
+    /// The outer poles of all samples.
     All,
-    /// Not those of removed features: sharper where the shape has corners.
+    /// Without the outer poles of removed features: sharper where the shape has corners.
     Remaining,
 }
 
 impl Outputs {
-    /// Refuses what the method has not or what could not be written, before anything is computed.
+    /// Refuses outputs that the method lacks or that cannot be written, before any computation.
     ///
     /// # Errors
-    /// When an extension is unknown, a folder not there, or the method has no such thing.
+    /// When an extension is unknown, a folder is missing, or the method has no voxels or poles.
     fn check(&self, method: &dyn MedialSimplifier) -> Result<(), Failure> {
         let info = method.info();
         check_output(self.output.as_deref())?;
@@ -340,10 +341,9 @@ impl Outputs {
     /// Writes the requested files.
     ///
     /// # Errors
-    /// When the poles have no power crust, and then nothing is written, or when a file cannot be
-    /// written.
+    /// When the poles have no power crust, and then nothing is written, or when a file cannot be written.
     fn write(&self, result: &Simplified, shape: &Shape) -> Result<(), Failure> {
-        // Before anything is written: whether there is a crust shows only when it is made.
+        // Before the first file is written: only its construction shows whether there is a crust.
         let crust = match (&self.power_crust, result.extras.get()) {
             (Some(path), Some(poles)) => Some((path, self.crust(path, poles, shape)?)),
             _ => None,
@@ -376,19 +376,19 @@ impl Outputs {
         let crust = poles.power_crust(shape, outer).map_err(|error| Failure::at(path, error))?;
         let mut crust = surface::crust_surface(&crust, COINCIDENT).mesh;
         if crust.faces.is_empty() {
-            return Err(Failure::at(path, "no pole is left: nothing to make a surface of"));
+            return Err(Failure::at(path, "no pole remains for a surface; request a finer level"));
         }
         let back = shape.normalisation();
         crust.vertices.iter_mut().for_each(|vertex| *vertex = back.backward(*vertex));
         Ok(crust)
     }
 
-    /// What was written, a line each.
+    /// A line for each written file.
     fn written(&self) -> Vec<String> {
         let files = [
             (&self.output, ""),
             (&self.voxels, ", a point for each voxel"),
-            (&self.power_crust, ", the power crust of the poles that are left"),
+            (&self.power_crust, ", the power crust of the remaining poles"),
         ];
         let written = files.into_iter().filter_map(|(path, what)| {
             path.as_ref().map(|path| format!("written: {}{what}", path.display()))

@@ -1,4 +1,4 @@
-//! `medial view X.ma [Y.ma ...] -o view.html`: medial meshes beside each other in a browser.
+//! `medial view X.ma [Y.ma ...] -o view.html`: medial meshes side by side in a browser.
 
 use std::path::PathBuf;
 
@@ -21,13 +21,13 @@ pub struct Arguments {
     /// Medial meshes in the same units.
     #[arg(required = true, value_name = "X.ma")]
     axes: Vec<PathBuf>,
-    /// Their surface: it is drawn as glass and coloured by the error of each result.
+    /// Draw this surface as glass, coloured by the error of each result.
     #[arg(long, value_name = "MESH")]
     mesh: Option<MeshArgument>,
-    /// The page: one file, which opens without a network.
+    /// Write the page, one file that opens offline.
     #[arg(short, long, value_name = "FILE.html")]
     output: PathBuf,
-    /// Show it in the browser.
+    /// Open the page in the browser.
     #[arg(long)]
     open: bool,
 }
@@ -45,7 +45,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     for path in paths {
         let (axis, remarks) = complex::read(path).map_err(Failure::input)?.with_remarks();
         if axis.spheres.is_empty() {
-            return Err(Failure::at(path, "no sphere to show"));
+            return Err(Failure::at(path, "no sphere"));
         }
         notes.extend(remarks);
         axes.push(axis);
@@ -72,7 +72,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// The corners of the box of some unions, without faces: what the camera has to hold.
+/// The corners of the box of some unions, without faces, for the camera.
 fn box_of(axes: &[MedialMesh]) -> TriMesh {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for sphere in axes.iter().flat_map(|axis| &axis.spheres) {

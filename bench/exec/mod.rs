@@ -1,11 +1,11 @@
-//! The supervisor: gives items to a worker, watches time and memory, and turns every way in which a
-//! worker can end into records, so that one broken method never stops the rest.
+//! The supervisor: gives items to a worker, watches time and memory, and records every kind of end of
+//! a worker, so that one broken method never stops the rest.
 //!
 //! | file | side |
 //! |---|---|
-//! | `mod`, `worker` | the supervisor's: requests, limits, ends |
-//! | `protocol` | the messages between both |
-//! | `serve` | the worker's |
+//! | `mod`, `worker` | supervisor: requests, limits, ends |
+//! | `protocol` | messages between both |
+//! | `serve` | worker |
 //! | `queue` | lists of items, and two builds in turn |
 
 pub mod protocol;
@@ -32,23 +32,23 @@ use crate::provenance::Provenance;
 use crate::store::StoreError;
 use crate::study::item::{Item, Limits, SceneSpec};
 
-/// Why items are not run, or no more of them.
+/// The reason for which a list of items stops.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The user interrupted the run.
     #[error("interrupted")]
     Interrupted,
     /// A worker cannot be started.
-    #[error("a worker process cannot be started: {0}")]
+    #[error("worker process: cannot be started ({0})")]
     Start(io::Error),
-    /// A record cannot be kept.
+    /// A record cannot be written.
     #[error(transparent)]
     Store(#[from] StoreError),
 }
 
 /// Runs items one after another, in a worker that it replaces when an item has broken it.
 pub struct Supervisor<'a> {
-    /// The program whose workers are used, where it is not the running one.
+    /// The program of the workers; `None` for the running one.
     program: Option<PathBuf>,
     plugins: Vec<PathBuf>,
     provenance: Provenance,
@@ -57,7 +57,7 @@ pub struct Supervisor<'a> {
     /// Set when the user interrupts the run.
     interrupted: &'a AtomicBool,
     worker: Option<Worker>,
-    /// SHA-256 of the input that was ready last.
+    /// The last input that a worker loaded, with its SHA-256.
     input: Option<(SceneSpec, String)>,
     /// An input that ended its worker.
     // Its other items are not tried: they would end the next worker at the same place.
@@ -97,12 +97,12 @@ impl<'a> Supervisor<'a> {
         }
     }
 
-    /// An item as these workers have to run it.
+    /// An item with the version of these workers.
     pub fn own(&self, item: &Item) -> Item {
         if self.program.is_none() {
             return item.clone();
         }
-        // Two builds are compared as such: the version of a method is not known of another program.
+        // Two builds are compared as a whole: the method versions of another program are unknown.
         let binary = self.provenance.binary_hash.clone();
         Item { version: binary.clone(), binary, ..item.clone() }
     }
@@ -112,49 +112,49 @@ impl<'a> Supervisor<'a> {
         Self { program: Some(program.to_owned()), ..self }
     }
 
-    /// Lets the worker go: the next item gets a new process.
+    /// Ends the worker: the next item gets a new process.
     pub fn renew(&mut self) {
         self.worker = None;
     }
 
     /// Runs an item: a record for each level, in the order of the levels.
     ///
-    /// When a worker ends, its reported records are kept. Levels that it had finished but not reported
-    /// are run again, the level that ended it gets the reason, and the later ones are not tried.
+    /// When a worker ends, the records that it reported stay. Levels that it finished but did not report
+    /// run again. The level that ended it gets the reason, and later levels are skipped.
     ///
     /// # Errors
     /// When the user interrupts, or no worker can be started.
     pub fn run(&mut self, item: &Item) -> Result<Vec<Record>, RunError> {
-        let (item, mut kept): (_, Vec<Record>) = (&self.own(item), Vec::new());
+        let (item, mut records): (_, Vec<Record>) = (&self.own(item), Vec::new());
         // A stack: groups that are split off run before later ones, from fine to coarse.
         let mut groups = vec![item.levels.clone()];
         while let Some(levels) = groups.pop() {
             let part = Item { levels, ..item.clone() };
-            let (attempt, told) = self.attempt(&part)?;
+            let (attempt, reported) = self.attempt(&part)?;
             let mut missing = part.levels.clone();
-            // What was reported before the end of the worker counts.
-            missing.retain(|level| told.iter().all(|kept| kept.simplify.level != *level));
-            kept.extend(told);
+            // Records that were reported before the end of the worker count.
+            missing.retain(|level| reported.iter().all(|record| record.simplify.level != *level));
+            records.extend(reported);
             let mut fail = |levels: &[Target], fault: &Fault| {
-                kept.extend(levels.iter().map(|&level| self.failed(item, level, fault)));
+                records.extend(levels.iter().map(|&level| self.failed(item, level, fault)));
             };
             match attempt {
                 Attempt::Finished => {
-                    let reason = "the worker told nothing of this level".to_owned();
+                    let reason = "the worker reported no result of this level".to_owned();
                     fail(&missing, &Fault { status: Status::Failed, reason });
                 }
                 Attempt::Refused(reason) => {
                     fail(&missing, &Fault { status: Status::Refused, reason });
                 }
-                Attempt::Ended(Stage::Asked(answered), fault) => {
-                    let at = part.levels[answered];
+                Attempt::Ended(Stage::Simplifying(reached), fault) => {
+                    let at = part.levels[reached];
                     let reason = format!("not run: the method ended its worker at {at}");
                     let not_run = Fault { reason, ..fault.clone() };
                     let mut before = Vec::new();
                     for level in &missing {
                         match part.levels.iter().position(|other| other == level) {
-                            Some(place) if place < answered => before.push(*level),
-                            Some(place) if place == answered => fail(&[*level], &fault),
+                            Some(place) if place < reached => before.push(*level),
+                            Some(place) if place == reached => fail(&[*level], &fault),
                             _ => fail(&[*level], &not_run),
                         }
                     }
@@ -175,9 +175,9 @@ impl<'a> Supervisor<'a> {
                 }
             }
         }
-        // Levels that were run again have come last.
-        kept.sort_by_key(|kept| item.levels.iter().position(|&l| l == kept.simplify.level));
-        Ok(kept)
+        // Levels that ran again come last.
+        records.sort_by_key(|record| item.levels.iter().position(|&l| l == record.simplify.level));
+        Ok(records)
     }
 
     /// Times all levels of an item that have a result once more.
@@ -190,7 +190,7 @@ impl<'a> Supervisor<'a> {
         first: &[Record],
     ) -> Result<Result<Vec<Repeated>, Fault>, RunError> {
         let mut item = item.clone();
-        // Whether a level is begun is decided once.
+        // The first run has decided which levels fit the budget.
         item.limits.budget = None;
         item.levels.retain(|&level| {
             first.iter().any(|record| record.simplify.level == level && record.status.has_result())
@@ -209,14 +209,14 @@ impl<'a> Supervisor<'a> {
         })
     }
 
-    /// Why a method does not take its parameters, found by preparing it on the smallest of shapes.
+    /// The reason for which a method rejects its parameters, found by preparing it on a very small shape.
     ///
     /// # Errors
     /// As [`Supervisor::run`].
     pub fn refused_params(&mut self, item: &Item) -> Result<Option<String>, RunError> {
         let request = Request::Probe { item: item.clone() };
         let mut refused = None;
-        // A method that ends its worker says nothing of its parameters.
+        // A method that ends its worker does not reject its parameters.
         self.converse(&request, &mut |event| {
             if let Event::WrongParameter(why) = event {
                 refused = Some(why);
@@ -225,7 +225,7 @@ impl<'a> Supervisor<'a> {
         Ok(refused)
     }
 
-    /// Puts a method to one case of the conformance corpus. One that ends its worker has failed.
+    /// Runs one case of the conformance corpus on a method. A method that ends its worker fails.
     ///
     /// # Errors
     /// As [`Supervisor::run`].
@@ -240,8 +240,9 @@ impl<'a> Supervisor<'a> {
         let outcome = match attempt {
             Attempt::Ended(_, fault) => Outcome::Failed(format!("{} (at: {at})", fault.reason)),
             Attempt::Refused(why) => Outcome::Failed(why),
-            Attempt::Finished => outcome
-                .unwrap_or_else(|| Outcome::Failed("the worker told nothing of this case".into())),
+            Attempt::Finished => {
+                outcome.unwrap_or_else(|| Outcome::Failed("the worker reported no outcome".into()))
+            }
         };
         // A method that went wrong may have left locks and caches in any state.
         if matches!(outcome, Outcome::Failed(_)) {
@@ -252,7 +253,7 @@ impl<'a> Supervisor<'a> {
 
     fn failed(&self, item: &Item, level: Target, fault: &Fault) -> Record {
         let mut record = failure_record(item, level, fault, &self.provenance);
-        // The hash of the bytes that the worker read, where it came that far: the planned one may be older.
+        // The hash of the bytes that the worker has read, if any: the planned hash may be older.
         let ready = self.input.as_ref().filter(|(scene, _)| *scene == item.scene);
         record.mesh_hash = ready.map(|(_, hash)| hash.clone()).or(record.mesh_hash);
         record
@@ -266,20 +267,20 @@ impl<'a> Supervisor<'a> {
         }
         let (axes, provenance) = (self.axes.clone(), Box::new(self.provenance.clone()));
         let request = Request::Run { item: item.clone(), axes, provenance };
-        let mut told = Vec::new();
+        let mut reported = Vec::new();
         let attempt = self.converse(&request, &mut |event| {
-            if let Event::Record(kept) = event {
-                told.push(*kept);
+            if let Event::Record(record) = event {
+                reported.push(*record);
             }
         })?;
         // A method that panicked may have left locks and caches in any state.
-        if told.iter().any(|kept| kept.status == Status::Panicked) {
+        if reported.iter().any(|record| record.status == Status::Panicked) {
             self.worker = None;
         }
-        Ok((attempt, told))
+        Ok((attempt, reported))
     }
 
-    /// Puts a request to a worker and listens until it has finished or is gone.
+    /// Sends a request to a worker and handles its events until it finishes or ends.
     fn converse(
         &mut self,
         request: &Request,
@@ -289,11 +290,11 @@ impl<'a> Supervisor<'a> {
         let mut worker = self.worker_for(request)?;
         let mut stage = Stage::Loading;
         let (mut refused, mut memory_refused) = (None, false);
-        if worker.ask(request).is_err() {
-            // Gone while it was idle: once more with a new one.
+        if worker.send(request).is_err() {
+            // It ended while it was idle: try a new one.
             drop(worker);
             worker = self.worker_for(request)?;
-            worker.ask(request).map_err(RunError::Start)?;
+            worker.send(request).map_err(RunError::Start)?;
         }
         let mut since = Instant::now();
         loop {
@@ -319,13 +320,13 @@ impl<'a> Supervisor<'a> {
                         self.input = item.map(|item| (item.scene.clone(), hash));
                         (stage, since) = (Stage::Preparing, Instant::now());
                     }
-                    // The limit is the method's; measuring has as much again.
+                    // Method and evaluation have the time limit each.
                     Event::Measuring => (stage, since) = (Stage::Measuring, Instant::now()),
-                    Event::Asked(level) => {
+                    Event::Simplifying(level) => {
                         let mut levels = item.iter().flat_map(|item| &item.levels);
-                        let place = levels.position(|&asked| asked == level);
-                        stage = Stage::Asked(place.unwrap_or(0));
-                        // A search is many runs: each bound has the time limit for itself.
+                        let place = levels.position(|&requested| requested == level);
+                        stage = Stage::Simplifying(place.unwrap_or(0));
+                        // A search is many runs: each bound has the whole time limit.
                         if matches!(level, Target::MaxError(_)) {
                             since = Instant::now();
                         }
@@ -338,13 +339,13 @@ impl<'a> Supervisor<'a> {
                     }
                 },
                 Err(RecvTimeoutError::Disconnected) => {
-                    let (status, last_words) = worker.collect();
+                    let (status, stderr) = worker.collect();
                     // A refused allocation that the worker survived did not end it.
                     let memory_refused = memory_refused && !status.is_some_and(|s| s.success());
-                    let fault = ended(stage, status, &last_words, memory_refused, &limits);
+                    let fault = ended(stage, status, &stderr, memory_refused, &limits);
                     return Ok(Attempt::Ended(stage, fault));
                 }
-                // Programs that the worker started are outside of its own limit.
+                // The memory limit of the worker does not cover the programs that it started.
                 Err(RecvTimeoutError::Timeout) if worker.resident_bytes() > limits.bytes => {
                     worker.end();
                     return Ok(Attempt::Ended(stage, out_of_memory(stage, &limits)));
@@ -354,7 +355,7 @@ impl<'a> Supervisor<'a> {
         }
     }
 
-    /// The worker that is there, where it fits the request, or a new one.
+    /// The present worker if it fits the request, else a new one.
     fn worker_for(&mut self, request: &Request) -> Result<Worker, RunError> {
         let (threads, limits) = request.terms();
         // The size of the pool and the limit of memory cannot be changed in a running process.
@@ -371,8 +372,8 @@ impl<'a> Supervisor<'a> {
     }
 }
 
-/// Adds a repetition to the records of an item. One that ended otherwise than the first makes the
-/// record say so: a method that sometimes breaks is broken.
+/// Adds a repetition to the records of an item. A fault of a repetition becomes the status of the
+/// record: a method that sometimes breaks is broken.
 pub fn merge(records: &mut [Record], repetition: usize, again: Result<Vec<Repeated>, Fault>) {
     for record in records {
         let level = record.simplify.level;
@@ -386,8 +387,7 @@ pub fn merge(records: &mut [Record], repetition: usize, again: Result<Vec<Repeat
             Some(Ok((laps, hash))) => {
                 record.repetitions.push(laps);
                 if record.result_hash.as_ref().is_some_and(|first| *first != hash) {
-                    let warning =
-                        "a repetition gave another medial mesh: the method is not deterministic";
+                    let warning = "a repetition returned a different medial mesh: the method is not deterministic";
                     if !record.simplify.warnings.iter().any(|known| known == warning) {
                         record.simplify.warnings.push(warning.to_owned());
                     }
@@ -409,8 +409,8 @@ pub fn merge(records: &mut [Record], repetition: usize, again: Result<Vec<Repeat
 enum Stage {
     Loading,
     Preparing,
-    /// The method was asked for its levels; this many had been answered.
-    Asked(usize),
+    /// The method simplifies to the level at this position.
+    Simplifying(usize),
     Measuring,
     Checking,
 }
@@ -418,11 +418,11 @@ enum Stage {
 impl Stage {
     fn words(self) -> &'static str {
         match self {
-            Self::Loading => "while the input was read and prepared",
-            Self::Preparing => "while the method prepared",
-            Self::Asked(_) => "while the method simplified",
-            Self::Measuring => "while the results were measured",
-            Self::Checking => "while the case ran",
+            Self::Loading => "while loading the input",
+            Self::Preparing => "during preparation",
+            Self::Simplifying(_) => "during simplification",
+            Self::Measuring => "during evaluation",
+            Self::Checking => "during the case",
         }
     }
 }
@@ -430,60 +430,54 @@ impl Stage {
 /// The limit of time was reached.
 fn timed_out(stage: Stage, limits: &Limits) -> Fault {
     let seconds = limits.seconds;
-    let reason = format!(
-        "ended after {seconds} s {}; --timeout gives it longer, and the same command tries again then",
-        stage.words()
-    );
+    let stage = stage.words();
+    let reason = format!("timed out after {seconds} s {stage}; rerun with a larger --timeout");
     Fault { status: Status::TimedOut, reason }
 }
 
 /// The limit of memory was reached.
 fn out_of_memory(stage: Stage, limits: &Limits) -> Fault {
     let megabytes = limits.bytes / 1_000_000;
-    let reason = format!(
-        "it needed more than {megabytes} MB {}; --memory gives it more, and the same command tries \
-         again then",
-        stage.words()
-    );
+    let stage = stage.words();
+    let reason = format!("used more than {megabytes} MB {stage}; rerun with a larger --memory");
     Fault { status: Status::OutOfMemory, reason }
 }
 
-/// The worker ended by itself: the fault by its exit status and its last words, or by its own signal
-/// that memory was refused.
+/// The fault of a worker that ended by itself: from its exit status and the end of its standard error,
+/// or from its own event that memory was refused.
 fn ended(
     stage: Stage,
     status: Option<ExitStatus>,
-    last_words: &str,
+    stderr: &str,
     memory_refused: bool,
     limits: &Limits,
 ) -> Fault {
-    // The last words of a program that gets no memory are often about something else.
+    // Without memory, the last message of a program is often unrelated.
     if memory_refused {
         return out_of_memory(stage, limits);
     }
     // Rust prints this and aborts: by its signal alone it would look like any other abort.
-    if last_words.contains("has overflowed its stack") {
+    if stderr.contains("has overflowed its stack") {
         let reason =
-            format!("its stack overflowed {}: is there a recursion without end?", stage.words());
+            format!("stack overflow {}; check the method for endless recursion", stage.words());
         return Fault { status: Status::Panicked, reason };
     }
-    let said =
-        last_line(last_words).map_or_else(String::new, |line| format!("; last words: {line}"));
-    let how = match status {
-        None => "its process vanished".to_owned(),
-        Some(status) => how_it_ended(status),
+    let message = last_line(stderr).map_or_else(String::new, |line| format!(": {line}"));
+    let end = match status {
+        None => "the process vanished".to_owned(),
+        Some(status) => describe_end(status),
     };
-    Fault { status: Status::Panicked, reason: format!("{how} {}{said}", stage.words()) }
+    Fault { status: Status::Panicked, reason: format!("{end} {}{message}", stage.words()) }
 }
 
-fn how_it_ended(status: ExitStatus) -> String {
+fn describe_end(status: ExitStatus) -> String {
     #[cfg(unix)]
     if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
-        return format!("its process was ended by {}", signal_name(signal));
+        return format!("the process was ended by {}", signal_name(signal));
     }
     match status.code() {
-        Some(code) => format!("its process ended itself with exit code {code}"),
-        None => "its process ended".to_owned(),
+        Some(code) => format!("the process ended with exit code {code}"),
+        None => "the process ended".to_owned(),
     }
 }
 

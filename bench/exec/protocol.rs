@@ -87,13 +87,14 @@ pub enum Event {
     Loading,
     /// The input is ready, its SHA-256; the method prepares.
     Preparing(String),
-    /// The method is asked for a level, or the search for the fewest spheres within a bound begins.
-    Asked(Target),
+    /// The method simplifies to a level, or searches the fewest spheres within a bound.
+    #[serde(rename = "Asked")]
+    Simplifying(Target),
     /// The results are being measured.
     Measuring,
-    /// The input is refused: why.
+    /// The reason for which the input is refused.
     Refused(String),
-    /// The method does not take its parameters: why.
+    /// The reason for which the method rejects its parameters.
     WrongParameter(String),
     /// The record of a level.
     Record(Box<Record>),
@@ -101,7 +102,7 @@ pub enum Event {
     Repeated(Target, Result<(Repetition, String), Fault>),
     /// A case of the conformance corpus has reached this step.
     Doing(String),
-    /// How the case ended.
+    /// The outcome of the case.
     Checked(Outcome),
     /// The system has refused memory to the worker, which may end because of it.
     OutOfMemory,
@@ -112,7 +113,7 @@ pub enum Event {
 /// Writes an event to standard output, where the supervisor reads.
 ///
 /// # Errors
-/// When nobody reads any more.
+/// When the supervisor has closed the pipe.
 pub fn send(event: &Event) -> io::Result<()> {
     let text = serde_json::to_string(event)?;
     // One write, and a line break first: a method may have printed an unfinished line.

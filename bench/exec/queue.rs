@@ -1,9 +1,9 @@
-//! Lists of items: what a store lacks is run and every record kept, by one program or by two builds that take turns,
-//! so that a loaded machine slows both alike.
+//! Lists of items: runs the items that a store lacks and records them, with one program or with two builds that
+//! alternate, so that a loaded machine slows both alike.
 //!
-//! Each repetition of two builds has a worker of its own on either side: where a process happens to lie in memory
-//! changes its speed by more than many a regression. Within a repetition the two sides follow each other item by
-//! item, and the side that begins changes from repetition to repetition.
+//! With two builds, each repetition starts new workers: the memory layout of a process changes its speed by more than
+//! many a regression. Within a repetition the two sides follow each other item by item, and the side that begins
+//! changes from repetition to repetition.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ use crate::provenance::{Provenance, hex_digest};
 use crate::store::{Store, StoreError};
 use crate::study::item::{Item, MethodSpec};
 
-/// The items with the levels that are missing in a store, and the number of levels that are there.
+/// The items with the levels that a store lacks, and the number of levels that it has.
 pub fn missing(items: &[Item], store: &Store, retry_failed: bool) -> (Vec<Item>, usize) {
     let mut found = 0;
     let mut left = Vec::new();
@@ -35,7 +35,7 @@ pub fn missing(items: &[Item], store: &Store, retry_failed: bool) -> (Vec<Item>,
     (left, found)
 }
 
-/// Why a method does not take its parameters, found before anything is run, by preparing on the smallest of shapes.
+/// The reason for which a method rejects its parameters, found before any run by preparing on a very small shape.
 ///
 /// # Errors
 /// When the user interrupts, or no worker can be started.
@@ -56,20 +56,20 @@ pub fn refused_params(
     Ok(None)
 }
 
-/// Runs items on each side and keeps their records there, as soon as each item is done. With repetitions, the
-/// items of one scene take turns, so that a slow minute of the machine does not affect one method
-/// alone; then their records are kept after the last turn.
+/// Runs items on each side and records each item as soon as it is done. With repetitions, the items of one scene
+/// alternate, so that a slow minute of the machine does not affect one method only. Their records are written after
+/// the last repetition.
 ///
-/// As many items run at the same time as each side has supervisors. `on_kept` gets the items that are still to be run
-/// whenever one is kept. Nothing else is timed meanwhile with one supervisor.
+/// As many items run at the same time as each side has supervisors. `on_recorded` gets the remaining items after each
+/// recorded one. With one supervisor nothing else runs while an item is timed.
 ///
 /// # Errors
-/// When the user interrupts, no worker can be started, or records cannot be kept.
+/// When the user interrupts, no worker can be started, or records cannot be written.
 pub fn run_items(
     items: &[Item],
     sides: &mut [Contender<'_>],
     verbosity: Verbosity,
-    on_kept: &mut (dyn FnMut(&[&Item]) + Send),
+    on_recorded: &mut (dyn FnMut(&[&Item]) + Send),
 ) -> Result<(), RunError> {
     let (mut lanes, mut stores): (Vec<Lane<'_, '_>>, _) = (Vec::new(), Vec::new());
     for Contender { supervisors, store } in sides {
@@ -85,13 +85,13 @@ pub fn run_items(
         waiting: items.iter().collect(),
         stores,
         progress: Progress::new(verbosity, turns.collect(), lanes.len()),
-        on_kept,
+        on_recorded,
     });
     thread::scope(|scope| {
         let lanes: Vec<_> =
             lanes.iter_mut().map(|lane| scope.spawn(|| work(lane, &desk))).collect();
         let ended = lanes.into_iter().map(|lane| lane.join().expect("a lane does not panic"));
-        // All are waited for, and the first error counts.
+        // Waits for all lanes and returns the first error.
         ended.collect::<Vec<_>>().into_iter().collect()
     })
 }
@@ -99,16 +99,16 @@ pub fn run_items(
 /// One supervisor of each side.
 type Lane<'s, 'a> = Vec<&'s mut Supervisor<'a>>;
 
-/// What the lanes share.
+/// The state that the lanes share.
 struct Desk<'d> {
     jobs: usize,
     /// Items that take turns, with the number of the batch.
     batches: VecDeque<(usize, &'d [Item])>,
-    /// Items that are not kept.
+    /// Items without records.
     waiting: Vec<&'d Item>,
     stores: Vec<&'d mut Store>,
     progress: Progress,
-    on_kept: &'d mut (dyn FnMut(&[&Item]) + Send),
+    on_recorded: &'d mut (dyn FnMut(&[&Item]) + Send),
 }
 
 fn lock<'m, 'd>(desk: &'m Mutex<Desk<'d>>) -> MutexGuard<'m, Desk<'d>> {
@@ -121,53 +121,53 @@ fn work(lane: &mut Lane<'_, '_>, desk: &Mutex<Desk<'_>>) -> Result<(), RunError>
         let Some((number, batch)) = lock(desk).batches.pop_front() else { return Ok(()) };
         let ended = run_batch(number, batch, lane, desk);
         let mut desk = lock(desk);
-        if let Err(error) = ended.and_then(|kept| Ok(desk.keep(batch, kept)?)) {
-            // The other lanes end after the items that they are at.
+        if let Err(error) = ended.and_then(|records| Ok(desk.record(batch, records)?)) {
+            // The other lanes end after their present items.
             desk.batches.clear();
             return Err(error);
         }
     }
 }
 
-/// Runs the items of a batch on each side, as often as each is repeated: their records by item and side.
+/// Runs the items of a batch with their repetitions on each side, and returns the records by item and side.
 fn run_batch(
     number: usize,
     batch: &[Item],
     lane: &mut Lane<'_, '_>,
     desk: &Mutex<Desk<'_>>,
 ) -> Result<Vec<Vec<Vec<Record>>>, RunError> {
-    let mut kept = vec![vec![vec![]; lane.len()]; batch.len()];
+    let mut all = vec![vec![vec![]; lane.len()]; batch.len()];
     for turn in 1..=batch[0].repeat.max(1) {
         if turn > 1 && lane.len() > 1 {
             lane.iter_mut().for_each(|supervisor| supervisor.renew());
         }
-        for (place, (item, kept)) in batch.iter().zip(&mut kept).enumerate() {
+        for (place, (item, by_side)) in batch.iter().zip(&mut all).enumerate() {
             lock(desk).progress.at(&item.scene.mesh, item.method.label(), [turn, item.repeat]);
             let begun = Instant::now();
-            // Each side begins as often as the others: the second one finds files in the cache of the system.
+            // Each side begins equally often: the second one profits from the file cache of the system.
             let first = number + place + turn;
             let sides = lane.len();
             for side in (0..sides).map(|side| (side + first) % sides) {
-                let kept = &mut kept[side];
+                let records = &mut by_side[side];
                 if turn == 1 {
-                    *kept = lane[side].run(item)?;
-                    let remarks = reasons(kept);
+                    *records = lane[side].run(item)?;
+                    let remarks = reasons(records);
                     remarks.iter().for_each(|remark| lock(desk).progress.remark(remark));
-                } else if kept.iter().any(|record| record.status.has_result()) {
-                    let again = lane[side].again(item, kept)?;
-                    merge(kept, turn, again);
+                } else if records.iter().any(|record| record.status.has_result()) {
+                    let again = lane[side].again(item, records)?;
+                    merge(records, turn, again);
                 }
             }
             lock(desk).progress.done(item.method.label(), begun.elapsed().as_secs_f64());
         }
     }
-    Ok(kept)
+    Ok(all)
 }
 
 impl Desk<'_> {
-    /// Keeps the records of a batch, with their seconds replaced by those of the median repetition.
-    fn keep(&mut self, batch: &[Item], kept: Vec<Vec<Vec<Record>>>) -> Result<(), StoreError> {
-        for (item, sides) in batch.iter().zip(kept) {
+    /// Records a batch with the seconds of the median repetition.
+    fn record(&mut self, batch: &[Item], all: Vec<Vec<Vec<Record>>>) -> Result<(), StoreError> {
+        for (item, sides) in batch.iter().zip(all) {
             for (store, mut records) in self.stores.iter_mut().zip(sides) {
                 for record in &mut records {
                     if let Some(seconds) = median(&record.repetitions, |r| r.seconds) {
@@ -177,10 +177,10 @@ impl Desk<'_> {
                     }
                     record.conditions.iter_mut().for_each(|conditions| conditions.jobs = self.jobs);
                 }
-                store.keep(&records)?;
+                store.append(&records)?;
             }
             self.waiting.retain(|other| !std::ptr::eq(*other, item));
-            (self.on_kept)(&self.waiting);
+            (self.on_recorded)(&self.waiting);
         }
         Ok(())
     }
@@ -204,20 +204,20 @@ impl Build {
     /// The build in a file.
     ///
     /// # Errors
-    /// In words, when it cannot be read or started, or is another program.
+    /// When it cannot be read or started, or is another program.
     pub fn of(program: &Path) -> Result<Self, String> {
         let failed = |error: io::Error| format!("{}: {error}", program.display());
         // A worker is started from any folder.
         let program = fs::canonicalize(program).map_err(failed)?;
         let bytes = fs::read(&program).map_err(failed)?;
         // Before any item: the worker of another program would fail at each of them.
-        let said = Command::new(&program).arg("--version").output().map_err(failed)?;
-        let answer = String::from_utf8_lossy(&said.stdout).trim().to_owned();
-        let Some(version) = answer.strip_prefix("medial ") else {
-            let (answer, program): (String, _) =
-                (answer.chars().take(40).collect(), program.display());
+        let output = Command::new(&program).arg("--version").output().map_err(failed)?;
+        let output = String::from_utf8_lossy(&output.stdout).trim().to_owned();
+        let Some(version) = output.strip_prefix("medial ") else {
+            let (found, program): (String, _) =
+                (output.chars().take(40).collect(), program.display());
             return Err(format!(
-                "{program}: no build of this program: `--version` gave {answer:?}"
+                "{program}: not a build of medial (`--version` printed {found:?})"
             ));
         };
         let provenance = Provenance {
@@ -231,8 +231,8 @@ impl Build {
 
 /// A side of a run: a program with its workers and its store.
 pub struct Contender<'a> {
-    /// Its supervisors, whose workers are of one build: as many items run at the same time.
+    /// Its supervisors, all of one build: the number of items that run at the same time.
     pub supervisors: Vec<Supervisor<'a>>,
-    /// Where its records are kept.
+    /// The store of its records.
     pub store: Store,
 }

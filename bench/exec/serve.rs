@@ -1,8 +1,8 @@
 //! The worker: a child process that runs items one after another and reports the results.
 //!
 //! It keeps the scene of its last item, so that substrates and judge are built once for all items
-//! of a mesh. It ends when its standard input ends, even in the middle of an item, because nobody
-//! waits for the answer then.
+//! of a mesh. It ends when its standard input ends, even in the middle of an item: the supervisor
+//! that would read the result has ended.
 
 use std::io::BufRead;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -48,7 +48,7 @@ pub fn serve(registry: &Registry, bytes: u64) -> ExitCode {
             Request::Again { item } => {
                 run(registry, &mut scene, &item, &mut |_, runs| send_repetitions(runs))
             }
-            Request::Check(item) => put_to(registry, &item),
+            Request::Check(item) => run_case(registry, &item),
         };
         if served.and_then(|()| send(&Event::Finished)).is_err() {
             break;
@@ -66,7 +66,7 @@ fn limit(bytes: u64) {
     {
         use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
         let _ = setrlimit(Resource::Core, Rlimit { current: Some(0), maximum: Some(0) });
-        // The hard limit stays: programs that the worker starts are watched by the supervisor alone.
+        // The hard limit stays: only the supervisor limits programs that the worker starts.
         let Rlimit { maximum, .. } = getrlimit(Resource::Data);
         let current = Some(bytes.min(maximum.unwrap_or(u64::MAX)));
         #[cfg(target_os = "linux")]
@@ -82,14 +82,14 @@ fn requests() -> Receiver<Request> {
     thread::spawn(move || {
         for line in io::stdin().lock().lines() {
             let request = line.ok().and_then(|line| serde_json::from_str(&line).ok());
-            // A line that is no request comes from another version: nothing can be served.
+            // An invalid line comes from another version, which cannot be served.
             let Some(request) = request else { break };
             if sender.send(request).is_err() {
                 break;
             }
         }
         drop(sender);
-        // An idle worker gets the time to end by itself.
+        // Time for an idle worker to end by itself.
         thread::sleep(Duration::from_millis(200));
         process_tree::end_descendants();
         // The supervisor removes it, too, unless it was killed.
@@ -126,7 +126,7 @@ fn run(
         Err(why) => return send(&Event::Refused(why)),
     };
     send(&Event::Preparing(scene.input.hash.clone()))?;
-    // Not found is a fault of each level, so that every requested row has its reason.
+    // An unknown method is a fault of each level, so that every requested record has its reason.
     let entry = find(registry, &item.method);
     let (unknown, context) = (MethodInfo::default(), RunContext::with_seed(item.seed));
     let info = entry.as_ref().map_or(&unknown, |entry| entry.method().info());
@@ -139,8 +139,8 @@ fn run(
     if !levels.is_empty() {
         let view = scene.shape().view();
         // The supervisor notices by itself when the pipe is closed.
-        let asked = |level: Level| drop(send(&Event::Asked(level.into())));
-        report(scene, answer(&view, info, || prepare(&view), &levels, &budget, asked))?;
+        let begin = |level: Level| drop(send(&Event::Simplifying(level.into())));
+        report(scene, answer(&view, info, || prepare(&view), &levels, &budget, begin))?;
     }
     let mut bounds: Vec<f64> =
         item.levels.iter().filter_map(|target| target.level().err()).collect();
@@ -160,11 +160,11 @@ fn run(
         prepare: &prepare,
         measure: &measure,
         budget: &budget,
-        searching: &|bound| drop(send(&Event::Asked(bound))),
+        searching: &|bound| drop(send(&Event::Simplifying(bound))),
         trying: &|_| {},
     };
-    // Each bound is recorded before the next, tighter one is searched: a method that ends its worker
-    // at a tight bound loses none of the looser ones.
+    // Each bound is recorded before the next, tighter one: a method that ends its worker at a tight
+    // bound loses none of the looser ones.
     search.answer(&bounds, &mut |run, _| report(scene, vec![run]))
 }
 
@@ -177,12 +177,12 @@ fn send_records(
     runs: &[LevelRun],
 ) -> io::Result<()> {
     send(&Event::Measuring)?;
-    for (run, verdict) in runs.iter().zip(judge(scene, runs)) {
-        let mut record = record(item, scene, run, verdict, provenance, axes);
-        // JSON has no infinity and no NaN, and writes `null`: such a record does not read back as it is.
+    for (run, evaluation) in runs.iter().zip(judge(scene, runs)) {
+        let mut record = record(item, scene, run, evaluation, provenance, axes);
+        // JSON has no infinity and no NaN, and writes `null`: reading the record back would change it.
         let text = serde_json::to_string(&record).unwrap_or_default();
         if serde_json::from_str::<Record>(&text).map_or(true, |back| back != record) {
-            let reason = "a number of its record is not finite".to_owned();
+            let reason = "the record has a number that is not finite".to_owned();
             let fault = Fault { status: Status::InvalidOutput, reason };
             record = failure_record(item, run.level, &fault, provenance);
         }
@@ -224,11 +224,11 @@ fn probe(registry: &Registry, item: &Item) -> io::Result<()> {
 }
 
 /// Runs one case of the conformance corpus on a method.
-fn put_to(registry: &Registry, item: &CheckItem) -> io::Result<()> {
+fn run_case(registry: &Registry, item: &CheckItem) -> io::Result<()> {
     send(&Event::Doing("starting".into()))?;
     let outcome = match (find(registry, &item.method), check::find(&item.case)) {
         (Err(why), _) => Outcome::Failed(why),
-        (_, None) => Outcome::Failed(format!("no case is called `{}`", item.case)),
+        (_, None) => Outcome::Failed(format!("unknown case `{}`", item.case)),
         (Ok(entry), Some(case)) => {
             let subject = Subject {
                 method: entry.method(),
@@ -247,7 +247,7 @@ fn put_to(registry: &Registry, item: &CheckItem) -> io::Result<()> {
 /// The method of an item, which must be the one that it was planned with.
 fn find<'r>(registry: &'r Registry, method: &MethodSpec) -> Result<&'r Entry, String> {
     let id = &method.id;
-    let entry = registry.entry(id).ok_or_else(|| format!("no method is called `{id}`"))?;
+    let entry = registry.entry(id).ok_or_else(|| format!("unknown method `{id}`"))?;
     let now = if id == GIVEN {
         crate::study::external::fingerprint(&method.params)
     } else {
@@ -256,7 +256,7 @@ fn find<'r>(registry: &'r Registry, method: &MethodSpec) -> Result<&'r Entry, St
     if now != method.fingerprint {
         let what = if id == GIVEN { "its file" } else { "its plug-in file or program" };
         let label = method.label();
-        return Err(format!("{label}: {what} has changed since the run was planned"));
+        return Err(format!("{label}: {what} has changed since the run was planned; run again"));
     }
     Ok(entry)
 }

@@ -1,4 +1,4 @@
-//! A worker from the supervisor's side: a child process, its events, its last words, its end.
+//! A worker from the supervisor's side: a child process, its events, its standard error, its end.
 
 use std::io::{BufReader, Write};
 use std::path::PathBuf;
@@ -36,9 +36,8 @@ pub struct Worker {
     tree: Tree,
     requests: Option<ChildStdin>,
     events: Receiver<Event>,
-    last_words: Drain,
-    /// Folder for the files of the programs that it starts; removed with the worker, however that
-    /// ends.
+    stderr: Drain,
+    /// Folder for the files of the programs that it starts; removed with the worker at any kind of end.
     _scratch: TempDir,
     /// How it was started.
     pub options: WorkerOptions,
@@ -72,20 +71,20 @@ impl Worker {
         let (sender, events) = mpsc::channel();
         thread::spawn(move || {
             receive(BufReader::new(output), |event| {
-                // Nobody listens once the worker is given up.
+                // Fails once the supervisor has dropped the worker.
                 let _ = sender.send(event);
             });
         });
-        let (last_words, tree) = (Drain::start(errors), Tree::of(&child));
+        let (stderr, tree) = (Drain::start(errors), Tree::of(&child));
         let requests = Some(requests);
-        Ok(Self { child, tree, requests, events, last_words, _scratch: scratch, options })
+        Ok(Self { child, tree, requests, events, stderr, _scratch: scratch, options })
     }
 
     /// Sends a request.
     ///
     /// # Errors
     /// When the worker no longer reads.
-    pub fn ask(&mut self, request: &Request) -> io::Result<()> {
+    pub fn send(&mut self, request: &Request) -> io::Result<()> {
         let requests = self.requests.as_mut().ok_or(io::ErrorKind::BrokenPipe)?;
         let mut line = serde_json::to_vec(request)?;
         line.push(b'\n');
@@ -106,13 +105,13 @@ impl Worker {
         self.tree.resident_bytes()
     }
 
-    /// Ends the worker and everything that it started, by force, and gives its exit status.
+    /// Kills the worker and everything that it started, and returns its exit status.
     pub fn end(mut self) -> Option<ExitStatus> {
         self.tree.end(&mut self.child)
     }
 
-    /// The exit status and the last words, once its output has ended. A process that only closed its
-    /// output is killed.
+    /// The exit status and the end of standard error, once its output has ended. A process that only
+    /// closed its output is killed.
     pub fn collect(mut self) -> (Option<ExitStatus>, String) {
         // Its output ends a moment before the process does.
         let deadline = Instant::now() + Duration::from_millis(500);
@@ -124,9 +123,9 @@ impl Worker {
             }
         }
         let killed = self.tree.end(&mut self.child);
-        // Everything that could hold the pipe is dead, so its end comes at once; the bound is for a
-        // process that waits for a disk.
-        (status.or(killed), self.last_words.finish(Instant::now() + LONGEST_DRAIN))
+        // Everything that could hold the pipe is dead, so it ends at once. The bound is for a process
+        // that waits for a disk.
+        (status.or(killed), self.stderr.finish(Instant::now() + LONGEST_DRAIN))
     }
 }
 

@@ -1,8 +1,8 @@
-//! First step of a run: a method answers, on the clock.
+//! First step of a run: the timed simplification.
 //!
-//! This is the only place where methods are timed. [`answer`] prepares once and asks for every level,
-//! each guarded against panics. It gives a [`LevelRun`] for each: the mesh, the times, the memory.
-//! Measuring and writing come later and are not timed.
+//! This is the only place where methods are timed. [`answer`] prepares once and computes every level,
+//! each guarded against panics. It returns a [`LevelRun`] for each: the mesh, the times, the memory.
+//! Evaluation and writing come later and are not timed.
 
 use std::any::Any;
 use std::cell::Cell;
@@ -21,20 +21,20 @@ use crate::measure::search::{Found, Measure, Search};
 pub struct LevelRun {
     /// The target of the run.
     pub level: Target,
-    /// The result, or why there is none.
+    /// The result, or the fault.
     pub outcome: Result<Simplified, Fault>,
     /// The cost of the level, and of the substrates that it used.
     pub times: Times,
 }
 
-/// Seconds and memory of one level, as if only this level had been asked.
+/// Seconds and memory of one level, as if only this level had been requested.
 #[derive(Clone, Debug, Default)]
 pub struct Times {
-    /// The substrates that the method used, each with its cost, whoever built it.
+    /// The substrates that the method used, each with the cost of its construction.
     pub substrates: Vec<(Substrate, Cost)>,
-    /// The method's own work that is the same for all levels.
+    /// The work of the method that all levels share.
     pub prepare: Cost,
-    /// The work from there to this level.
+    /// The further work for this level.
     pub simplify: Cost,
     /// Peak of live bytes, with the substrates that the method used.
     pub peak_bytes: u64,
@@ -58,12 +58,12 @@ impl Times {
     }
 }
 
-/// Why a level has no result.
+/// The reason for which a level has no result.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fault {
     /// The kind of failure.
     pub status: Status,
-    /// The reason, in a sentence.
+    /// The reason, one line without a full stop.
     pub reason: String,
 }
 
@@ -84,7 +84,7 @@ impl From<SimplifyError> for Fault {
     }
 }
 
-/// The time that the levels of a method may use together: once it is used up, no further level is begun.
+/// The time that the levels of a method may use together. After it, no further level starts.
 pub struct Budget {
     begun: Instant,
     /// Seconds; `None` without a limit.
@@ -99,12 +99,13 @@ impl Budget {
         Self { begun: Instant::now(), seconds, has_level: Cell::new(false) }
     }
 
-    /// Why no further level is begun.
+    /// The fault of levels that do not start because the budget is used up.
     fn used_up(&self) -> Option<Fault> {
         let (used, seconds) = (self.begun.elapsed().as_secs_f64(), self.seconds?);
         (self.has_level.get() && used > seconds).then(|| {
-            let reason =
-                format!("not run: the method had used the {seconds} s of --budget on this mesh");
+            let reason = format!(
+                "not run: the budget of {seconds} s is used up; rerun with a larger --budget"
+            );
             Fault { status: Status::Skipped, reason }
         })
     }
@@ -113,9 +114,9 @@ impl Budget {
 /// Starts a simplification on a view of a shape and computes every level as long as the budget lasts, the first
 /// one always. `on_level` gets each level before it is computed.
 ///
-/// The seconds of a level are those of its call alone. Where `info` declares the method incremental,
-/// they are those of all calls since the preparation; levels of another kind, and a finer level after
-/// a coarser one, then get a preparation of their own, because they cannot continue.
+/// The seconds of a level are those of its call. Where `info` declares the method incremental, they are
+/// those of all calls since the preparation. Levels of another kind, and a finer level after a coarser
+/// one, then get a new preparation, because they cannot continue.
 ///
 /// The view must be fresh: everything that was used through it is listed as used.
 pub fn answer<'s>(
@@ -133,12 +134,12 @@ pub fn answer<'s>(
         let count = 1 + rest[1..]
             .iter()
             .take_while(|&&next| {
-                let goes_on = !info.incremental || continues(info, previous, next);
+                let is_next = !info.incremental || continues(info, previous, next);
                 previous = next;
-                goes_on
+                is_next
             })
             .count();
-        // All that one preparation can serve, charged as one run of growing length.
+        // All levels of one preparation, timed as one run of growing length.
         let (together, others) = rest.split_at(count);
         runs.extend(of_one_preparation(
             view,
@@ -153,7 +154,7 @@ pub fn answer<'s>(
     runs
 }
 
-/// Whether a level can continue from another: one of the same kind that is no finer.
+/// Whether a level can continue from another of the same kind: it must not be finer.
 fn continues(info: &MethodInfo, previous: Level, next: Level) -> bool {
     match (previous, next) {
         (Level::Spheres(before), Level::Spheres(count)) => count <= before,
@@ -175,7 +176,7 @@ fn of_one_preparation<'s>(
     on_level: impl Fn(Level),
 ) -> Vec<LevelRun> {
     let before = view.spent();
-    // Levels that are not begun need no preparation either.
+    // Without budget for a level, the preparation is skipped, too.
     let (started, mut prepare) = Cost::of(|| budget.used_up().map_or_else(|| guarded(start), Err));
     // Substrates are shared between methods, so building them here is not the method's own work.
     let built = view.spent();
@@ -201,7 +202,7 @@ fn of_one_preparation<'s>(
     let mut runs = Vec::new();
     for &level in levels {
         let target = level.into();
-        // A simplification that panicked is in an unknown state: it is not called again.
+        // A simplification that panicked is in an unknown state and must not be called again.
         if let Some(fault) = broken.clone().or_else(|| budget.used_up()) {
             runs.push(LevelRun { level: target, outcome: Err(fault), times: clock.times() });
             continue;
@@ -236,7 +237,7 @@ impl Clock<'_> {
         // A lap counts from the live bytes at its start, to which earlier levels have added.
         let peak = self.held + lap.usage.peak_bytes;
         self.held += lap.usage.held_bytes;
-        // An incremental method reaches a coarse level through the finer ones: alone it would take them all.
+        // An incremental method reaches a coarse level through the finer ones, whose costs add up.
         if self.is_incremental {
             self.so_far.seconds += lap.seconds;
             self.so_far.cpu_seconds += lap.cpu_seconds;
@@ -249,7 +250,7 @@ impl Clock<'_> {
 
     fn times(&self) -> Times {
         let substrates = self.view.used();
-        // Built one after another: each adds its own bytes, and needs its peak on top of the others.
+        // Built one after another: each adds its bytes, and its peak comes on top of the others.
         let mut built = Cost::default();
         substrates.iter().for_each(|(_, cost)| built += *cost);
         let Usage { held_bytes: held, peak_bytes: peak } = built.usage;
@@ -272,8 +273,8 @@ fn checked(level: Level, simplified: Simplified) -> Result<Simplified, Fault> {
     if simplified.mesh.spheres.is_empty() {
         let why = simplified.diagnostics.warnings.join("; ");
         let why = if why.is_empty() { why } else { format!(" ({why})") };
-        let reason = format!("the result has no sphere{why}; ask for a finer level");
-        // A shape need not have anything at a native level, but some spheres at every count.
+        let reason = format!("the result has no sphere{why}; request a finer level");
+        // A native level may be empty, but every count has some spheres.
         let status = match level {
             Level::Spheres(_) => Status::Failed,
             Level::Native(_) | Level::Published => Status::Unsupported,
@@ -285,7 +286,7 @@ fn checked(level: Level, simplified: Simplified) -> Result<Simplified, Fault> {
 
 /// The result of some work, with a panic turned into a fault.
 pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, SimplifyError>) -> Result<T, Fault> {
-    // What a panic leaves behind is not used again: callers drop or abandon the simplification.
+    // The state after a panic is not used again: callers drop the simplification.
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(outcome) => Ok(outcome?),
         Err(payload) => {
@@ -326,7 +327,7 @@ pub struct Bounds<'a> {
     pub prepare: &'a Prepare<'a>,
     /// Measures results.
     pub measure: &'a Measure<'a>,
-    /// Ends the searches: bounds that are not begun have no result.
+    /// The time for all searches: bounds that do not start have no result.
     pub budget: &'a Budget,
     /// Gets each bound before the search for it.
     pub searching: &'a dyn Fn(Target),
@@ -335,8 +336,8 @@ pub struct Bounds<'a> {
 }
 
 impl Bounds<'_> {
-    /// A run for each bound, given from large to small, with the level of the search that it is a run of: `each` gets
-    /// it before the next search begins. The seconds are those of the level found, without the search.
+    /// A run for each bound, from large to small, with the result of its search: `each` gets it before the next search
+    /// begins. The seconds are those of the level found, without the search.
     ///
     /// # Errors
     /// When `each` fails.
@@ -376,7 +377,7 @@ impl Bounds<'_> {
                 None => guarded(|| search.within(bound)),
             };
             self.budget.has_level.set(true);
-            // A method that panicked is in no state to be asked again.
+            // A method that panicked is in an unknown state and must not be called again.
             broken = found.as_ref().err().filter(|fault| fault.status == Status::Panicked).cloned();
             match found {
                 Ok(found) => {

@@ -38,11 +38,11 @@ pub struct Scene {
     /// Measures results against the surface as it was read.
     pub judge: Judge,
     clean: Ready,
-    /// The shape with the noise that was asked last.
+    /// The shape with the noise of the last request.
     noisy: Option<(Noise, Ready)>,
 }
 
-/// A shape, and what is to be said of its initial medial mesh.
+/// A shape, and warnings about its initial medial mesh.
 struct Ready {
     shape: Shape,
     initial: Option<Initial>,
@@ -322,7 +322,7 @@ pub fn record(
     record
 }
 
-/// Copies what the result cost.
+/// Copies the costs of the result.
 pub fn fill_costs(simplify: &mut Simplify, times: &Times) {
     simplify.substrates =
         times.substrates.iter().map(|(s, cost)| (s.name().to_owned(), cost.seconds)).collect();

@@ -1,8 +1,8 @@
 //! The coarsest level within an error bound, searched for every method alike.
 //!
 //! The error does not fall strictly with the number of spheres, and the finest level need not be
-//! the best: initial medial meshes have flaws that methods mend. So a sweep comes first, and no bound is
-//! refused that one of its levels keeps.
+//! the best: initial medial meshes have flaws that methods repair. So a sweep comes first, and no bound is
+//! refused that one of its levels meets.
 //!
 //! 1. A geometric sweep of counts, from that of the initial medial mesh down to ten, and the numbers
 //!    below. A method that continues from finer levels computes all of them in one run, and they are
@@ -20,12 +20,13 @@ use std::collections::BTreeMap;
 
 use medial::complex::MedialMesh;
 use medial::simplifier::{Level, Simplification, SimplifyError};
+use medial_reports::significant;
 
 /// Counts of the sweep for a method that computes them in one run, and for others.
 const COUNTS: [usize; 2] = [40, 24];
 /// Where the geometric part of the sweep ends.
 const FEW: usize = 10;
-/// Of the others every so many is tried at first.
+/// For other methods, every `STRIDE`-th count is tried first.
 const STRIDE: usize = 4;
 /// A level with an error above this multiple of the bound has no level within the bound next to it.
 const HOPELESS: f64 = 1.5;
@@ -36,7 +37,7 @@ const INTERVALS: usize = 3;
 /// Bisections of native levels.
 const BISECTIONS: usize = 7;
 
-/// How a medial mesh is measured: its error as a fraction of the diagonal.
+/// Measures a medial mesh: its error as a fraction of the diagonal.
 pub type Measure<'a> = dyn Fn(&MedialMesh) -> Result<f64, String> + 'a;
 
 /// A level that was tried.
@@ -53,15 +54,15 @@ pub struct Probe {
 /// The result of a search for one bound.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
-    /// The fewest spheres within the bound; `None` where no level that was tried is.
+    /// The fewest spheres within the bound; `None` if no tried level is within it.
     pub within: Option<Probe>,
-    /// The lowest error of all that was tried; `None` where the method gave no result at all.
+    /// The tried level with the lowest error; `None` if the method had no result.
     pub best: Option<Probe>,
     /// Number of levels that were tried.
     pub tried: usize,
 }
 
-/// A search on one simplification. Later bounds know what was tried before.
+/// A search on one simplification. Later bounds reuse the earlier probes.
 pub struct Search<'a> {
     simplification: &'a mut dyn Simplification,
     /// Whether coarser levels continue from finer ones.
@@ -75,7 +76,7 @@ pub struct Search<'a> {
     refusal: Option<SimplifyError>,
     /// The counts of the sweep, ascending.
     counts: Vec<usize>,
-    own: Vec<Level>,
+    native: Vec<Level>,
 }
 
 impl<'a> Search<'a> {
@@ -95,7 +96,7 @@ impl<'a> Search<'a> {
         let mut counts: Vec<usize> = geometric.chain(1..FEW.min(most)).collect();
         counts.sort_unstable();
         counts.dedup();
-        let own = sweep.iter().map(|&value| Level::Native(value)).chain([Level::Published]);
+        let native = sweep.iter().map(|&value| Level::Native(value)).chain([Level::Published]);
         Self {
             simplification,
             is_incremental,
@@ -106,7 +107,7 @@ impl<'a> Search<'a> {
             tried: 0,
             refusal: None,
             counts,
-            own: own.collect(),
+            native: native.collect(),
         }
     }
 
@@ -127,9 +128,9 @@ impl<'a> Search<'a> {
             let between: Vec<usize> = between.collect();
             self.ascend(&between, bound)?;
         }
-        // A method may take no counts, or reach lower errors at levels of its own.
+        // A method may take no counts, or reach lower errors at native levels.
         if self.fewest(bound).is_none() {
-            for level in std::mem::take(&mut self.own) {
+            for level in std::mem::take(&mut self.native) {
                 self.probe(level)?;
             }
         }
@@ -171,7 +172,7 @@ impl<'a> Search<'a> {
             }
         }
         for &count in counts {
-            // Also measured before: the bound may be another.
+            // Also for counts that were measured for another bound.
             if self.fewest(bound).is_some_and(|best| best.spheres <= count) {
                 break;
             }
@@ -203,7 +204,7 @@ impl<'a> Search<'a> {
                 Ok(None)
             }
             Ok(simplified) => Ok(Some(simplified.mesh)),
-            // The only error that ends a search: the user wants no more.
+            // The only error that ends a search.
             Err(SimplifyError::Cancelled) => Err(SimplifyError::Cancelled),
             Err(refusal) => {
                 self.refusal = Some(refusal);
@@ -232,8 +233,8 @@ impl<'a> Search<'a> {
         within.min_by(|a, b| a.spheres.cmp(&b.spheres).then(a.error.total_cmp(&b.error))).copied()
     }
 
-    /// Whether a count below the fewest within the bound may be within it, judged by the nearest counts
-    /// that were measured.
+    /// Whether a count below the fewest within the bound may be within it, by the errors of the nearest
+    /// measured counts.
     fn is_hopeful(&self, count: usize, bound: f64) -> bool {
         let below = self.probes.iter().filter(|probe| probe.spheres <= count);
         let above = self.probes.iter().filter(|probe| probe.spheres >= count);
@@ -287,10 +288,10 @@ impl<'a> Search<'a> {
 impl Found {
     /// The message for a bound that no level meets.
     pub fn refusal(&self, bound: f64) -> String {
-        let percent = |fraction: f64| format!("{:.3} %", 100.0 * fraction);
+        let percent = |fraction: f64| format!("{} %", significant(100.0 * fraction, 3));
         let best = self.best.map_or_else(String::new, |Probe { level, spheres, error }| {
             let count = match level {
-                Level::Spheres(asked) if asked == spheres => String::new(),
+                Level::Spheres(requested) if requested == spheres => String::new(),
                 _ => format!(", which has {spheres} spheres"),
             };
             format!(": the lowest error is {} at {level}{count}", percent(error))
@@ -311,17 +312,17 @@ mod tests {
     use medial::complex::{MedialMesh, Sphere};
     use medial::simplifier::Simplified;
 
-    /// A method whose error at each number of spheres is given; meshes are told apart by their
-    /// number of spheres alone.
+    /// The search on a method with a known error at each number of spheres; meshes differ only in
+    /// their number of spheres.
     fn found(
         is_incremental: bool,
         most: usize,
         bound: f64,
-        answers: impl Fn(Level) -> Option<usize> + Send,
+        spheres_at: impl Fn(Level) -> Option<usize> + Send,
         error: impl Fn(usize) -> f64,
     ) -> Found {
         let mut method = move |level: Level| {
-            let count = answers(level).ok_or_else(|| SimplifyError::unsupported("no"))?;
+            let count = spheres_at(level).ok_or_else(|| SimplifyError::unsupported("no"))?;
             let sphere = |i: usize| Sphere { centre: Vec3::X * i as f64, radius: 1.0 };
             let spheres = (0..count).map(sphere).collect();
             let mesh = MedialMesh { spheres, ..MedialMesh::default() };
@@ -360,7 +361,7 @@ mod tests {
         }
     }
 
-    /// A bound that one count of a dense sweep keeps is kept, by hardly more spheres.
+    /// A bound that one count of a dense sweep meets is met, with hardly more spheres.
     #[test]
     fn a_single_good_count_between_bad_ones_is_not_missed() {
         let most = 17_501_usize;
@@ -397,7 +398,7 @@ mod tests {
             let found = found(is_incremental, 1_000, 0.001, counts, error);
             assert_eq!(found.within, None);
             let why = found.refusal(0.001);
-            assert!(why.contains("2.100 % at 1000 spheres;") && why.contains("0.100 %"), "{why}");
+            assert!(why.contains("2.10 % at 1000 spheres;") && why.contains("0.100 %"), "{why}");
         }
     }
 }

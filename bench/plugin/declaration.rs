@@ -1,4 +1,4 @@
-//! Plug-ins as they stand in a TOML file, read and checked: the declaration, the words of its command, and the reasons
+//! Plug-in declarations in a TOML file, read and checked: the declaration, the words of its command, and the reasons
 //! for which a file is refused.
 
 use std::collections::BTreeSet;
@@ -39,10 +39,10 @@ struct Written {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum OutputUnits {
-    /// Those of the surface.
+    /// The units of the surface.
     #[default]
     None,
-    /// Whatever scale and shift fit, where the output does not fit as it is.
+    /// Fitted by scale and shift where the output does not fit unscaled.
     Auto,
 }
 
@@ -57,7 +57,7 @@ struct WrittenParam {
     help: String,
 }
 
-/// A kind of level that a plug-in can be asked for.
+/// A kind of level that a plug-in supports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum LevelKind {
@@ -76,9 +76,18 @@ impl LevelKind {
         }
     }
 
-    /// As in the file, which is also the placeholder that passes it.
+    /// The name in the file, which is also the placeholder.
     pub fn name(self) -> String {
         format!("{self:?}").to_lowercase()
+    }
+
+    /// The name in messages, and the options that request a level of this kind.
+    pub fn words(self) -> [&'static str; 2] {
+        match self {
+            Self::Spheres => ["sphere counts", "--spheres N"],
+            Self::Native => ["native level", "--level X"],
+            Self::Published => ["published level", "no level"],
+        }
     }
 }
 
@@ -92,18 +101,18 @@ pub(super) struct Declaration {
     pub native: Option<NativeLevel>,
     pub params: Vec<ParamInfo>,
     pub fit: OutputUnits,
-    /// The command as it was written, for the fingerprint.
+    /// The command as in the file, for the fingerprint.
     pub written: Vec<String>,
     /// The program: an absolute path, or a name that was found in `PATH`.
     pub program: PathBuf,
     pub arguments: Vec<Word>,
-    /// Where the program runs, and relative paths start.
+    /// The working folder of the program and of relative paths.
     pub folder: PathBuf,
     /// Files that the program reads, besides the words of its command.
     pub files: Vec<PathBuf>,
 }
 
-/// Why a file of plug-ins is refused: the file, the line, and what to do.
+/// The reason for which a plug-in file is refused.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "{}{}: {message}",
@@ -115,11 +124,11 @@ pub struct PluginError {
     pub file: PathBuf,
     /// Line number from 1, where the reason belongs to a line.
     pub line: Option<usize>,
-    /// What is wrong, and what to do.
+    /// Problem and advice.
     pub message: String,
 }
 
-/// The bytes of the file that are wrong, and why.
+/// The wrong bytes of the file, and the reason.
 type Fault = (Option<Range<usize>>, String);
 
 fn fault<T>(span: Range<usize>, message: impl Into<String>) -> Result<T, Fault> {
@@ -159,7 +168,7 @@ fn read_document(text: &str, folder: &Path, taken: &[&str]) -> Result<Vec<Declar
             return fault(at, taken_id(&id));
         }
         if !ids.insert(id.clone()) {
-            let message = format!("a method above is called `{id}` too; give one another id");
+            let message = format!("a method above has the id `{id}` too; change one of them");
             return fault(at, message);
         }
         declarations.push(written.check(folder)?);
@@ -168,16 +177,14 @@ fn read_document(text: &str, folder: &Path, taken: &[&str]) -> Result<Vec<Declar
 }
 
 pub(super) fn taken_id(id: &str) -> String {
-    format!("there is a method called `{id}` already; choose another id")
+    format!("the id `{id}` is taken; choose another")
 }
 
 pub(super) fn wrong_id(id: &str) -> String {
-    format!(
-        "the id {id:?} is not made of lower-case letters, digits and inner hyphens; choose another"
-    )
+    format!("invalid id (found {id:?}, expected lower-case letters, digits and inner hyphens)")
 }
 
-/// Whether a text would do as an id on the command line.
+/// Whether a text is a valid id on the command line.
 pub(crate) fn is_id(text: &str) -> bool {
     !text.is_empty()
         // The command line would take it for an option.
@@ -195,12 +202,12 @@ impl Written {
         let mut words = self.command.get_ref().iter();
         let Some(program) = words.next().filter(|program| !program.get_ref().is_empty()) else {
             let message =
-                "the command is empty; write the program and its arguments, each a word of its own";
+                "the command is empty; write the program and its arguments as separate words";
             return fault(self.command.span(), message);
         };
         let Some(name) = parse(program)?.plain() else {
             let message =
-                format!("the program {:?} has a placeholder; name it as it is", program.get_ref());
+                format!("the program {:?} has a placeholder; write its name", program.get_ref());
             return fault(program.span(), message);
         };
         let program = find_program(&name, folder).or_else(|why| fault(program.span(), why))?;
@@ -224,8 +231,7 @@ impl Written {
         for file in &self.files {
             let path = folder.join(file.get_ref());
             if !path.is_file() {
-                let message =
-                    format!("there is no regular file {}; correct `files`", path.display());
+                let message = format!("{}: not a regular file; correct `files`", path.display());
                 return fault(file.span(), message);
             }
         }
@@ -250,13 +256,13 @@ impl Written {
         let passes =
             |name: &str| arguments.iter().any(|word| word.placeholders().any(|p| p == name));
         if !passes("output") {
-            let message = "no argument has {output}; pass the program the name of the file that it has to write";
+            let message = "no argument has {output}; pass the program the name of its output file";
             return fault(self.command.span(), message);
         }
         if let Some(param) = self.params.iter().find(|param| !passes(&param.get_ref().name)) {
             let name = &param.get_ref().name;
             let message = format!(
-                "no argument has {{{name}}}; pass the parameter to the program, or take it out"
+                "no argument has {{{name}}}; pass the parameter to the program, or remove it"
             );
             return fault(param.span(), message);
         }
@@ -282,7 +288,7 @@ impl Written {
                 }
                 (false, true) => {
                     let message = format!(
-                        "an argument has {{{name}}}, but levels has no {name:?}; declare it, or take it out"
+                        "an argument has {{{name}}}, but levels has no {name:?}; declare or remove it"
                     );
                     return fault(self.command.span(), message);
                 }
@@ -299,10 +305,10 @@ fn check_params(written: &[Spanned<WrittenParam>]) -> Result<Vec<ParamInfo>, Fau
         let WrittenParam { name, default, unit, help } = spanned.get_ref();
         let wrong = |why: &str| fault(spanned.span(), format!("`{name}` {why}"));
         if PLACEHOLDERS.contains(&name.as_str()) {
-            return wrong("is the name of a placeholder; give the parameter another name");
+            return wrong("is the name of a placeholder; rename the parameter");
         }
         if params.iter().any(|other| other.name == *name) {
-            return wrong("is the name of a parameter above, too; give one another name");
+            return wrong("is the name of a parameter above, too; rename one of them");
         }
         // Numbers keep the digits of the file: the program gets them as text.
         let default = match default {
@@ -310,7 +316,7 @@ fn check_params(written: &[Spanned<WrittenParam>]) -> Result<Vec<ParamInfo>, Fau
             toml::Value::Integer(number) => number.to_string(),
             toml::Value::Float(number) => format!("{number:?}"),
             toml::Value::Boolean(flag) => flag.to_string(),
-            _ => return wrong("has a default that is not a text, a number, or true or false"),
+            _ => return wrong("has a wrong default (expected a text, a number, true or false)"),
         };
         params.push(ParamInfo::new(name.clone(), default, unit.clone(), help.clone()));
     }
@@ -324,14 +330,14 @@ fn parse(word: &Spanned<String>) -> Result<Word, Fault> {
 /// A program by a path, which starts at the folder, or by its name in `PATH`.
 fn find_program(name: &str, folder: &Path) -> Result<PathBuf, String> {
     let absent = |searched: &str| {
-        format!("there is no program {name:?} {searched}; install it, or correct the command")
+        format!("no program {name:?} {searched}; install it, or correct the command")
     };
     if name.contains(['/', std::path::MAIN_SEPARATOR]) {
         let path = folder.join(name);
         if is_program(&path) {
             return Ok(path);
         }
-        return Err(absent(&format!("at {}, or it may not be executed", path.display())));
+        return Err(absent(&format!("that can be executed at {}", path.display())));
     }
     let path = std::env::var_os("PATH").unwrap_or_default();
     // There is no shell that appends `.exe`.
@@ -353,16 +359,16 @@ fn is_program(path: &Path) -> bool {
     metadata.is_file() && allowed
 }
 
-/// What the runner fills in, beside the parameters.
+/// Placeholders that the runner fills in, in addition to the parameters.
 pub(super) const PLACEHOLDERS: [&str; 7] =
     ["surface", "initial", "output", "spheres", "native", "seed", "threads"];
 
 /// A word of a command: text and placeholders in turn.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Word(Vec<Piece>);
+pub(super) struct Word(Vec<WordPart>);
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum Piece {
+enum WordPart {
     Text(String),
     Placeholder(String),
 }
@@ -371,7 +377,7 @@ impl Word {
     /// Reads a word: `{name}` is a placeholder, `{{` and `}}` are the braces themselves.
     pub fn parse(word: &str) -> Result<Self, String> {
         let single = || {
-            format!("a brace in {word:?} has no partner; write {{{{ or }}}} for the brace itself")
+            format!("a brace in {word:?} has no partner; write {{{{ or }}}} for a literal brace")
         };
         let (mut pieces, mut text, mut rest) = (Vec::new(), String::new(), word);
         while let Some(at) = rest.find(['{', '}']) {
@@ -386,22 +392,22 @@ impl Word {
             if brace == "}" || name.contains('{') {
                 return Err(single());
             }
-            pieces.push(Piece::Text(std::mem::take(&mut text)));
-            pieces.push(Piece::Placeholder(name.to_owned()));
+            pieces.push(WordPart::Text(std::mem::take(&mut text)));
+            pieces.push(WordPart::Placeholder(name.to_owned()));
             rest = after;
         }
         text.push_str(rest);
-        pieces.push(Piece::Text(text));
-        // So that equal words compare as equal, however their braces stood.
-        pieces.retain(|piece| *piece != Piece::Text(String::new()));
+        pieces.push(WordPart::Text(text));
+        // So that equal words compare as equal, independent of their braces.
+        pieces.retain(|piece| *piece != WordPart::Text(String::new()));
         Ok(Self(pieces))
     }
 
     /// Names of the placeholders.
     pub fn placeholders(&self) -> impl Iterator<Item = &str> {
         self.0.iter().filter_map(|piece| match piece {
-            Piece::Placeholder(name) => Some(name.as_str()),
-            Piece::Text(_) => None,
+            WordPart::Placeholder(name) => Some(name.as_str()),
+            WordPart::Text(_) => None,
         })
     }
 
@@ -414,8 +420,8 @@ impl Word {
     pub fn fill(&self, value: impl Fn(&str) -> String) -> String {
         (self.0.iter())
             .map(|piece| match piece {
-                Piece::Text(text) => text.clone(),
-                Piece::Placeholder(name) => value(name),
+                WordPart::Text(text) => text.clone(),
+                WordPart::Placeholder(name) => value(name),
             })
             .collect()
     }

@@ -1,5 +1,5 @@
 //! A program as a method: its parameters and files, its command, and the meaning of its exit code, its output and its
-//! last words.
+//! standard error.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -25,14 +25,14 @@ use super::program::{self, Ended, NoEnd};
 use crate::process_tree::signal_name;
 use crate::provenance::hex;
 
-/// Variable of the environment that names the folder in which temporary folders are made.
+/// Environment variable with the folder of temporary folders.
 pub const SCRATCH: &str = "MEDIAL_SCRATCH";
 
-/// A method that is a program of its own, as a file of plug-ins declares it.
+/// An external program as a method, declared in a plug-in file.
 ///
 /// [`MedialSimplifier::prepare`] writes the files that the program reads, and each level is a run of
-/// the program. So what the program does before it knows the level is done for each level anew, and
-/// counted so; [`OwnSeconds`](super::OwnSeconds) tells the parts apart where the program does.
+/// the program. So the program repeats its preparation for each level, and its time counts each time.
+/// A program can report the parts as [`OwnSeconds`](super::OwnSeconds).
 #[derive(Debug)]
 pub struct External {
     info: MethodInfo,
@@ -56,13 +56,13 @@ impl External {
         Ok(Self { info, declaration: Arc::new(declaration), fingerprint })
     }
 
-    /// SHA-256 over the declaration and its files: an edited script is not taken for the old one.
+    /// SHA-256 over the declaration and its files: an edited script is a new version.
     pub fn fingerprint(&self) -> &str {
         &self.fingerprint
     }
 
-    /// On files that the command names inside of a word, such as `--in=in.ma` or a script in a line for a shell, and that
-    /// the fingerprint does not cover.
+    /// A warning about files that the command names inside of a word, such as `--in=in.ma` or a script in a shell
+    /// command, and that the fingerprint does not cover.
     pub fn remark(&self) -> Option<String> {
         let Declaration { id, folder, arguments, .. } = &*self.declaration;
         let covered: Vec<_> = files(&self.declaration).flat_map(fs::canonicalize).collect();
@@ -75,7 +75,7 @@ impl External {
         });
         (!names.is_empty()).then(|| {
             let names = names.join(", ");
-            format!("plug-in {id}: changes of {names} rerun nothing; list them in `files = [...]`")
+            format!("plug-in {id}: edits of {names} go unnoticed; list them in `files = [...]`")
         })
     }
 
@@ -87,7 +87,7 @@ impl External {
         if let Some(key) = params.0.keys().find(|key| !declared.iter().any(|p| p.name == **key)) {
             let names: Vec<&str> = declared.iter().map(|param| &*param.name).collect();
             let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-            let message = format!("unknown parameter `{key}`; there are: {known}");
+            let message = format!("unknown parameter `{key}` (expected one of: {known})");
             return Err(SimplifyError::Parameter(message));
         }
         let mut values = Vec::new();
@@ -103,7 +103,7 @@ impl External {
         Ok(values)
     }
 
-    fn asks_for(&self, placeholder: &str) -> bool {
+    fn uses(&self, placeholder: &str) -> bool {
         let mut words = self.declaration.arguments.iter();
         words.any(|word| word.placeholders().any(|name| name == placeholder))
     }
@@ -122,12 +122,12 @@ impl MedialSimplifier for External {
     ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
         // Before any substrate is built: a wrong parameter must not cost the time for one.
         let mut values = self.values(params)?;
-        // Only where the command names it: the method is charged for each substrate that it uses.
-        let initial = if self.asks_for("initial") { Some(shape.initial()?) } else { None };
+        // Only where the command names it: each substrate that is used counts in the method's seconds.
+        let initial = if self.uses("initial") { Some(shape.initial()?) } else { None };
         let scratch = scratch_folder().map_err(|error| cannot("make a temporary folder", error))?;
         let files = ["surface.off", "initial.ma"].map(|name| scratch.path().join(name));
         let back = shape.normalisation();
-        if self.asks_for("surface") {
+        if self.uses("surface") {
             let vertices = shape.mesh().vertices.iter().map(|&v| back.backward(v)).collect();
             let mesh = TriMesh { vertices, faces: shape.mesh().faces.clone() };
             surface::write(&files[0], &mesh).map_err(|error| cannot("write {surface}", error))?;
@@ -146,7 +146,7 @@ impl MedialSimplifier for External {
     }
 }
 
-/// One shape in files.
+/// A program with one shape in files.
 struct PreparedProgram<'s> {
     shape: &'s Shape,
     declaration: Arc<Declaration>,
@@ -161,7 +161,7 @@ impl Simplification for PreparedProgram<'_> {
     fn at(&mut self, level: Level) -> Result<Simplified, SimplifyError> {
         self.check(level)?;
         let output = self.scratch.path().join("output.ma");
-        // What an earlier level left there must not be taken for the output at this one.
+        // The output of an earlier level must not pass for this one.
         match fs::remove_file(&output) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {
                 return Err(cannot("clear {output}", error));
@@ -185,16 +185,14 @@ impl PreparedProgram<'_> {
     fn check(&self, level: Level) -> Result<(), SimplifyError> {
         let Declaration { id, levels, .. } = &*self.declaration;
         if !levels.contains(&LevelKind::of(level)) {
-            let known: Vec<String> = levels.iter().map(|kind| kind.name()).collect();
-            let known = known.join(", ");
-            return Err(SimplifyError::unsupported(format!(
-                "the plug-in {id} is not asked for {level}: its levels are {known}"
-            )));
+            let options: Vec<&str> = levels.iter().map(|kind| kind.words()[1]).collect();
+            let (kind, options) = (LevelKind::of(level).words()[0], options.join(" or "));
+            return Err(SimplifyError::unsupported(format!("{id} has no {kind}; give {options}")));
         }
         match level {
-            Level::Spheres(0) => Err(SimplifyError::Level("ask for at least one sphere".into())),
+            Level::Spheres(0) => Err(SimplifyError::Level("give at least one sphere".into())),
             Level::Native(value) if !value.is_finite() => {
-                Err(SimplifyError::Level(format!("{value} is not a finite number")))
+                Err(SimplifyError::Level(format!("expected a finite number, found {value}")))
             }
             _ => Ok(()),
         }
@@ -218,7 +216,7 @@ impl PreparedProgram<'_> {
         command
     }
 
-    /// The result of a program that says that it is done.
+    /// The result of a program that exited with code 0.
     fn result(
         &self,
         level: Level,
@@ -235,11 +233,8 @@ impl PreparedProgram<'_> {
         };
         let diagnostics = &mut simplified.diagnostics;
         report.warnings.into_iter().chain(notes).for_each(|warning| diagnostics.warn(warning));
-        if ended.strays > 0 {
-            let (count, were) = (ended.strays, if ended.strays == 1 { "was" } else { "were" });
-            diagnostics.warn(format!(
-                "the program had left {count} of its processes behind, which {were} ended"
-            ));
+        if ended.orphans > 0 {
+            diagnostics.warn(format!("processes that the program left running: {}", ended.orphans));
         }
         simplified.extras.insert(ProgramPeak(ended.peak));
         if let Some(seconds) = report.seconds {
@@ -248,35 +243,35 @@ impl PreparedProgram<'_> {
         Ok(simplified)
     }
 
-    /// The medial mesh of the output in normalised units, and what was repaired.
+    /// The medial mesh of the output in normalised units, and notes on repairs.
     fn read(&self, output: &Path) -> Result<(MedialMesh, Vec<String>), SimplifyError> {
         let invalid = |why: String| Err(SimplifyError::InvalidOutput(why));
         let metadata = match fs::metadata(output) {
-            Err(_) => return invalid("exit 0, but no file at {output}".to_owned()),
+            Err(_) => return invalid("{output}: no file, but exit code 0".to_owned()),
             // A device or a pipe could be read without end.
             Ok(metadata) if !metadata.is_file() => {
-                return invalid("exit 0, but what is at {output} is not a file".to_owned());
+                return invalid("{output}: not a regular file".to_owned());
             }
             Ok(metadata) => metadata,
         };
         let bytes = metadata.len();
-        // By the size that the system gives: an endless file must not be read to find out.
+        // By the size that the system reports: an endless file must not be read.
         if bytes > LARGEST_OUTPUT {
             return invalid(format!(
-                "the file at {{output}} has {bytes} bytes, {LARGEST_OUTPUT} at most"
+                "{{output}}: too large (found {bytes} bytes, expected at most {LARGEST_OUTPUT})"
             ));
         }
         let bytes = match fs::read(output) {
             Ok(bytes) => bytes,
-            Err(error) => return invalid(format!("the file at {{output}}: {error}")),
+            Err(error) => return invalid(format!("{{output}}: {error}")),
         };
         let strict = ReadOptions { radii: Radii::NotNegative, ..ReadOptions::default() };
         let mut loaded = match complex::parse_ma(bytes, "", strict) {
             Ok(loaded) => loaded,
             Err(error) => {
-                // The file's name is a temporary one and says nothing.
+                // The name of the temporary file would not help.
                 let line = error.line.map_or_else(String::new, |line| format!(", line {line}"));
-                return invalid(format!("the file at {{output}}{line}: {}", error.kind));
+                return invalid(format!("{{output}}{line}: {}", error.kind));
             }
         };
         if self.declaration.fit == OutputUnits::Auto
@@ -288,7 +283,7 @@ impl PreparedProgram<'_> {
         reach(&loaded.mesh, self.shape).map_err(SimplifyError::InvalidOutput)?;
         let normal = self.shape.normalisation();
         let mesh = loaded.mesh.transformed(1.0 / normal.diagonal, |p| normal.forward(p));
-        // The reader repairs lists, the check refuses what no repair can mean.
+        // The reader repairs lists, and the check refuses all other defects.
         mesh.check()?;
         Ok((mesh, loaded.notes))
     }
@@ -298,10 +293,10 @@ impl PreparedProgram<'_> {
 // Next to its spheres the whole surface is less than a rounding error.
 const LARGEST_SPHERE: f64 = 1e12;
 
-/// How far a medial mesh in the unit of a shape's input reaches from the middle of the surface, in diagonals.
+/// The largest extent of a medial mesh, in the units of a shape's input, from the middle of the surface, in diagonals.
 ///
 /// # Errors
-/// In words, which sphere is too far away to be measured.
+/// Names the sphere that is too far away to be measured.
 pub fn reach(mesh: &MedialMesh, shape: &Shape) -> Result<f64, String> {
     let to_normal = shape.normalisation();
     let mut reach = 0.0_f64;
@@ -313,15 +308,14 @@ pub fn reach(mesh: &MedialMesh, shape: &Shape) -> Result<f64, String> {
         // An overflow gives a size that is infinite or not a number.
         if size.is_nan() || size > LARGEST_SPHERE {
             return Err(format!(
-                "sphere {id} reaches {size:.1e} diagonals of the surface away from it: the medial mesh is in other \
-                 units, or of another surface"
+                "sphere {id}: too far from the surface ({size:.1e} diagonals); check the units and the surface"
             ));
         }
     }
     Ok(reach)
 }
 
-/// The system does not let us do something: that is no fault of the program.
+/// An operation that the system refused, not a fault of the program.
 fn cannot(what: &str, error: impl std::fmt::Display) -> SimplifyError {
     SimplifyError::Failed(format!("cannot {what}: {error}"))
 }
@@ -330,7 +324,7 @@ fn scratch_folder() -> io::Result<TempDir> {
     let mut builder = tempfile::Builder::new();
     builder.prefix("medial-");
     match std::env::var_os(SCRATCH).filter(|folder| !folder.is_empty()) {
-        // The program runs elsewhere: a relative path would lead it astray.
+        // The program runs in another folder, where a relative path would be wrong.
         Some(folder) => builder.tempdir_in(std::path::absolute(folder)?),
         None => builder.tempdir(),
     }
@@ -376,45 +370,45 @@ fn fingerprint(declaration: &Declaration) -> io::Result<String> {
     Ok(hex(&hasher.finalize()))
 }
 
-/// Exit code of a program that does not do what it was asked, which is an answer and no failure.
+/// Exit code of a program that does not support the request, which is not a failure.
 const UNSUPPORTED: i32 = 65;
-/// Bytes of an output; larger ones are refused unread.
+/// Most bytes of an output; larger files are refused unread.
 const LARGEST_OUTPUT: u64 = 1_000_000_000;
 
-/// Most resident bytes of a program and its descendants together, as far as they were looked at.
+/// Most resident bytes of a program and its descendants together, at the times of sampling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ProgramPeak(pub u64);
 
-/// Nothing, if the program says that it is done.
+/// Returns an error for every exit code but 0.
 fn check_status(id: &str, status: ExitStatus, stderr: &str) -> Result<(), SimplifyError> {
-    let said = last_line(stderr);
+    let message = last_line(stderr);
     match status.code() {
         Some(0) => Ok(()),
         Some(UNSUPPORTED) => {
-            let why = said.unwrap_or_else(|| {
-                format!("{id} ended with exit code {UNSUPPORTED} and gave no reason")
+            let why = message.unwrap_or_else(|| {
+                format!("{id}: exit code {UNSUPPORTED} without a reason on standard error")
             });
             Err(SimplifyError::Unsupported { why })
         }
         Some(code) => {
-            let said = said.unwrap_or_else(|| "nothing on standard error".to_owned());
-            Err(SimplifyError::Failed(format!("{id} ended with exit code {code}: {said}")))
+            let message = message.unwrap_or_else(|| "no text on standard error".to_owned());
+            Err(SimplifyError::Failed(format!("{id}: exit code {code}: {message}")))
         }
         None => {
-            let said = said.map_or_else(String::new, |line| format!("; it said: {line}"));
+            let message = message.map_or_else(String::new, |line| format!(": {line}"));
             #[cfg(unix)]
             let signal = std::os::unix::process::ExitStatusExt::signal(&status).unwrap_or(0);
             #[cfg(not(unix))]
             let signal = 0;
             let by = signal_name(signal);
-            Err(SimplifyError::Crashed(format!("{id} was ended by {by}{said}")))
+            Err(SimplifyError::Crashed(format!("{id}: ended by {by}{message}")))
         }
     }
 }
 
-/// More or longer warnings than this are a program that writes its log there.
+/// Most warnings of a program; further ones are probably a log.
 const MOST_WARNINGS: usize = 50;
-/// Characters of a warning.
+/// Most characters of a warning.
 const LONGEST_WARNING: usize = 1000;
 
 /// Seconds that a program measured by itself.
@@ -427,13 +421,13 @@ pub struct OwnSeconds {
     pub simplify: Option<f64>,
 }
 
-/// What a program reports of itself.
+/// The report of a program about its run.
 #[derive(Debug, Default, PartialEq, Deserialize)]
 #[serde(default)]
 struct Report {
     seconds: Option<OwnSeconds>,
     native_level: Option<f64>,
-    /// Its own, then those on the report.
+    /// Warnings of the program, then warnings about the report.
     warnings: Vec<String>,
     #[serde(flatten)]
     unknown: BTreeMap<String, Value>,
@@ -441,7 +435,7 @@ struct Report {
 
 impl Report {
     /// The last line that is a JSON object.
-    // Programs print what they like: a report that makes no sense costs no result, only a warning.
+    // Programs print any text: an invalid report gives a warning and keeps the result.
     fn of(stdout: &str) -> Self {
         let mut objects = stdout
             .lines()
@@ -451,30 +445,32 @@ impl Report {
         let mut report = match serde_json::from_value::<Self>(Value::Object(object)) {
             Ok(report) => report,
             Err(why) => {
-                let ignored = format!("its report makes no sense and is ignored: {why}");
+                let ignored = format!("the report is invalid and ignored: {why}");
                 return Self { warnings: vec![clean(&ignored)], ..Self::default() };
             }
         };
         report.warnings.truncate(MOST_WARNINGS);
         report.warnings.iter_mut().for_each(|warning| *warning = clean(warning));
         for key in std::mem::take(&mut report.unknown).into_keys() {
-            report.warnings.push(format!("its report has a key `{}`, ignored", clean(&key)));
+            report
+                .warnings
+                .push(format!("the report has an unknown key `{}`, ignored", clean(&key)));
         }
         let seconds = report.seconds.unwrap_or_default();
         if [seconds.prepare, seconds.simplify].into_iter().flatten().any(|seconds| seconds < 0.0) {
-            report.warnings.push("its report has negative seconds, ignored".to_owned());
+            report.warnings.push("the report has negative seconds, ignored".to_owned());
             report.seconds = None;
         }
         report
     }
 }
 
-/// The last line that is not empty, fit to stand in a sentence.
+/// The last line that is not empty, without control characters.
 fn last_line(text: &str) -> Option<String> {
     text.lines().rev().map(clean).find(|line| !line.is_empty())
 }
 
-/// A text of a program without what would disturb a terminal or a table.
+/// A text of a program without control characters, of limited length.
 fn clean(text: &str) -> String {
     // Escape sequences of a program would move the cursor in a printed table.
     let printable = text.chars().map(|c| if c.is_control() { ' ' } else { c });
@@ -486,7 +482,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_object_counts_and_what_is_odd_in_it_is_named() {
+    fn the_last_object_counts_and_invalid_parts_give_warnings() {
         let text = "log\n{\"native_level\": 1}\n{\"native_level\": 2.5, \"seconds\": {\"simplify\": 3, \
                     \"io\": 1}, \"warnings\": [\"thin\\u0007\"], \"extra\": 0}\nbye\n[1]\n";
         let report = Report::of(text);
@@ -502,7 +498,7 @@ mod tests {
     }
 
     #[test]
-    fn last_lines_are_fit_to_be_read() {
+    fn last_lines_have_no_control_characters() {
         assert_eq!(last_line("one\ntwo\u{1b}[0m \n\n").as_deref(), Some("two [0m"));
         assert_eq!(last_line(" \n"), None);
     }

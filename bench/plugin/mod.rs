@@ -9,8 +9,8 @@
 //! levels = ["spheres"]
 //! ```
 //!
-//! [`load`] reads such a file; each method is an [`External`]. What a program is given, what it has
-//! to give back and what its exit code means stands in `docs/plugins.md`.
+//! [`load`] reads such a file; each method is an [`External`]. `docs/plugins.md` describes the inputs,
+//! the outputs and the exit codes of a program.
 //!
 //! | file | step |
 //! |---|---|
@@ -40,8 +40,8 @@ pub(crate) use program::Drain;
 /// Reads and checks a file of plug-ins: its methods, in its order.
 ///
 /// # Errors
-/// When the file cannot be read or is wrong: the error names the line and says what to do. An id that
-/// is among `taken`, those of the methods that there are, is wrong too.
+/// When the file cannot be read or is wrong, with the line and advice, or when an id is among `taken`,
+/// the ids of the known methods.
 pub fn load(path: &Path, taken: &[&str]) -> Result<Vec<External>, PluginError> {
     let text = check_regular(path).and_then(|()| fs::read_to_string(path));
     let text = text.map_err(|why| refused(path, format!("cannot be read: {why}")))?;
@@ -66,35 +66,35 @@ fn refused(path: &Path, why: impl ToString) -> PluginError {
     PluginError { file: path.to_owned(), line: None, message: why.to_string() }
 }
 
-/// A host of the command loads methods from files of its own language, as the Python package does with classes. The
-/// command alone knows no such language. These methods run in the worker itself.
+/// Loads methods from files in the language of the host, as the Python package does with classes. The command alone
+/// has no loader. These methods run inside the worker process.
 pub trait ScriptLoader: Send + Sync {
     /// The methods of a file, in its order.
     ///
     /// # Errors
-    /// When the file cannot be loaded or has no method: why, in a sentence.
+    /// When the file cannot be loaded, with the reason.
     fn load(&self, path: &Path) -> Result<Vec<Registered>, String>;
 }
 
-/// The methods of a file of classes, and the SHA-256 of that file: an edited class is not taken for the old one.
+/// The methods of a file of classes, and the SHA-256 of that file: an edited class is a new version.
 ///
 /// # Errors
-/// When there is no loader or it refuses the file, and when an id is no id or among `taken`.
+/// When there is no loader or it refuses the file, and when an id is invalid or among `taken`.
 pub fn load_script(
     path: &Path,
     loader: Option<&dyn ScriptLoader>,
     taken: &[&str],
 ) -> Result<(Vec<Registered>, String), PluginError> {
     let loader = loader.ok_or_else(|| {
-        let why = "Python classes run in the command of the Python package: `pip install medialaxis`, and use its \
-                   `medial`; or declare a program that runs them, in a TOML file";
+        let why = "Python classes need the command of the Python package; run `pip install medialaxis` and use its \
+                   `medial`, or declare a program in a TOML file";
         refused(path, why)
     })?;
     let bytes = check_regular(path).and_then(|()| fs::read(path));
     let bytes = bytes.map_err(|error| refused(path, error))?;
     let methods = loader.load(path).map_err(|why| refused(path, why))?;
     if methods.is_empty() {
-        let why = "no class is a method; put @medial_axis.simplifier before one";
+        let why = "no method found; put @medial_axis.simplifier before a class";
         return Err(refused(path, why));
     }
     // Classes of one file must differ from each other, too.
@@ -125,7 +125,7 @@ mod tests {
         fn load(&self, _: &Path) -> Result<Vec<Registered>, String> {
             let method = |id: &&'static str| {
                 let info = MethodInfo::new(*id, "A class");
-                simple(info, |_, _| Err(SimplifyError::unsupported("never asked here"))).into()
+                simple(info, |_, _| Err(SimplifyError::unsupported("never run here"))).into()
             };
             match self.0 {
                 ["?"] => Err("SyntaxError: line 1".to_owned()),
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn classes_need_a_loader_and_ids_of_their_own() {
+    fn classes_need_a_loader_and_unique_ids() {
         let dir = tempfile::tempdir().expect("a folder");
         let file = dir.path().join("mine.py");
         fs::write(&file, "class A: ...").expect("a file");
@@ -146,8 +146,8 @@ mod tests {
         assert!(refused(Some(&Ids(&["?"]))).ends_with("mine.py: SyntaxError: line 1"));
         assert!(refused(Some(&Ids(&[]))).contains("@medial_axis.simplifier"));
         assert!(refused(Some(&Ids(&["Mine"]))).contains("lower-case"));
-        assert!(refused(Some(&Ids(&["qmat"]))).contains("called `qmat`"));
-        assert!(refused(Some(&Ids(&["mine", "mine"]))).contains("called `mine`"));
+        assert!(refused(Some(&Ids(&["qmat"]))).contains("id `qmat` is taken"));
+        assert!(refused(Some(&Ids(&["mine", "mine"]))).contains("id `mine` is taken"));
     }
 
     #[test]

@@ -1,10 +1,10 @@
-//! Runs a program to its end, whatever it does.
+//! Runs a program to its end.
 //!
-//! 1. It is started in a process group of its own, with nothing on standard input.
-//! 2. Two threads take what it writes, and keep the end of it, so that no pipe ever fills.
-//! 3. Until it ends it is looked at now and then: memory, and whether the run was cancelled.
-//! 4. What it left running is ended. Only then is the end of its output awaited, for a while:
-//!    whoever still holds a pipe would keep it open for ever.
+//! 1. Start it in a new process group, with empty standard input.
+//! 2. Two threads read its outputs, so that no pipe ever fills, and keep the last bytes.
+//! 3. Until it ends, sample its memory and check whether the run was cancelled.
+//! 4. Kill its remaining processes. Only then wait for the end of its output, for a limited time:
+//!    a process with an open pipe would block for ever.
 
 use std::io::{self, Read};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -16,14 +16,14 @@ use medial::simplifier::RunContext;
 
 use crate::process_tree::Tree;
 
-/// How much of the end of each output is kept.
-const KEPT: usize = 64 * 1024;
-/// Longest time between two looks.
-const LOOK_AGAIN: Duration = Duration::from_millis(10);
-/// First one.
-// Short, because programs that are quick to end are not waited for.
-const FIRST_LOOK: Duration = Duration::from_micros(200);
-/// How long outputs may stay open after everything was ended.
+/// Bytes of the end of each output that stay in memory.
+const TAIL_BYTES: usize = 64 * 1024;
+/// Longest time between two samples.
+const LONGEST_PAUSE: Duration = Duration::from_millis(10);
+/// Time before the second sample.
+// Short, so that the time of quick programs is exact.
+const FIRST_PAUSE: Duration = Duration::from_micros(200);
+/// Longest wait for the end of outputs after all processes have ended.
 const LONGEST_DRAIN: Duration = Duration::from_secs(2);
 
 /// How a program ended.
@@ -34,16 +34,16 @@ pub(super) struct Ended {
     pub stdout: String,
     /// The end of its standard error.
     pub stderr: String,
-    /// Most resident bytes of it and its descendants together, as far as they were looked at.
+    /// Most resident bytes of it and its descendants together, at the times of sampling.
     pub peak: u64,
-    /// Processes that it had left running.
-    pub strays: usize,
+    /// Number of processes that it left running.
+    pub orphans: usize,
 }
 
-/// Why there is no end.
+/// The reason for a run without an exit status.
 #[derive(Debug)]
 pub(super) enum NoEnd {
-    /// It cannot be started, or not be waited for.
+    /// It cannot be started or waited for.
     System(io::Error),
     /// The run was cancelled, and the program with all its descendants ended.
     Cancelled,
@@ -56,8 +56,8 @@ impl From<io::Error> for NoEnd {
 }
 
 /// Lifts the limit of memory that a program inherits from its worker.
-// The supervisor limits both together by their resident bytes: what a program prints when an
-// allocation fails decides nothing.
+// The supervisor limits both together by their resident bytes: the message of a program after a
+// failed allocation is irrelevant.
 fn lift_limit(child: &Child) {
     #[cfg(target_os = "linux")]
     {
@@ -76,7 +76,7 @@ pub(super) fn run(mut command: Command, context: &RunContext) -> Result<Ended, N
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn()?;
-    // At once: children that leave the group early are known by having been seen.
+    // At once: children that leave the group early are found only by an early listing.
     let mut tree = Tree::of(&child);
     lift_limit(&child);
     let stdout = child.stdout.take().map(Drain::start);
@@ -89,12 +89,12 @@ pub(super) fn run(mut command: Command, context: &RunContext) -> Result<Ended, N
             return Err(none);
         }
     };
-    // Before the outputs are read: a stray that holds a pipe would keep them open.
-    let strays = tree.end_orphans();
+    // Before the outputs are read: an orphan with an open pipe would block them.
+    let orphans = tree.end_orphans();
     let deadline = Instant::now() + LONGEST_DRAIN;
     let [stdout, stderr] = [stdout, stderr].map(|drain| drain.map(|drain| drain.finish(deadline)));
     let (stdout, stderr) = (stdout.unwrap_or_default(), stderr.unwrap_or_default());
-    Ok(Ended { status, stdout, stderr, peak, strays })
+    Ok(Ended { status, stdout, stderr, peak, orphans })
 }
 
 fn watch(
@@ -102,9 +102,9 @@ fn watch(
     tree: &mut Tree,
     context: &RunContext,
 ) -> Result<(ExitStatus, u64), NoEnd> {
-    let (mut peak, mut pause) = (0, FIRST_LOOK);
+    let (mut peak, mut pause) = (0, FIRST_PAUSE);
     loop {
-        // Before the status: of a process that has ended nothing can be read any more.
+        // Before the status: the memory of an ended process cannot be read.
         peak = peak.max(tree.resident_bytes());
         if let Some(status) = child.try_wait()? {
             return Ok((status, peak));
@@ -114,28 +114,28 @@ fn watch(
         }
         thread::sleep(pause);
         // Short programs are timed well, long ones are not disturbed.
-        pause = (2 * pause).min(LOOK_AGAIN);
+        pause = (2 * pause).min(LONGEST_PAUSE);
     }
 }
 
-/// A thread that takes an output and keeps its end.
+/// A thread that reads an output and stores its end.
 pub(crate) struct Drain {
     end: Arc<Mutex<Tail>>,
     thread: JoinHandle<()>,
 }
 
 impl Drain {
-    /// From the start of a process: one that fills a pipe that nobody reads would wait for ever.
+    /// Call it at the start of a process: a process with a full pipe waits for ever.
     pub fn start(mut output: impl Read + Send + 'static) -> Self {
         let end = Arc::new(Mutex::new(Tail::default()));
-        let kept = Arc::clone(&end);
+        let tail = Arc::clone(&end);
         let thread = thread::spawn(move || {
-            let mut buffer = vec![0; KEPT];
+            let mut buffer = vec![0; TAIL_BYTES];
             loop {
                 match output.read(&mut buffer) {
                     Ok(0) => break,
-                    Ok(count) => lock(&kept).push(&buffer[..count]),
-                    // A signal to this process is no end of the output.
+                    Ok(count) => lock(&tail).push(&buffer[..count]),
+                    // A signal to this process does not end the output.
                     Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                     Err(_) => break,
                 }
@@ -144,10 +144,10 @@ impl Drain {
         Self { end, thread }
     }
 
-    /// The end of the output. A thread that is not done by then is left behind; it ends with its output.
+    /// The end of the output. A thread that has not finished by the deadline ends with its output.
     pub fn finish(&self, deadline: Instant) -> String {
         while !self.thread.is_finished() && Instant::now() < deadline {
-            thread::sleep(FIRST_LOOK);
+            thread::sleep(FIRST_PAUSE);
         }
         lock(&self.end).text()
     }
@@ -157,7 +157,7 @@ fn lock(tail: &Mutex<Tail>) -> std::sync::MutexGuard<'_, Tail> {
     tail.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The last [`KEPT`] bytes of what was pushed, and up to as many before them.
+/// The last [`TAIL_BYTES`] pushed bytes, and up to as many before them.
 #[derive(Default)]
 struct Tail(Vec<u8>);
 
@@ -165,14 +165,14 @@ impl Tail {
     fn push(&mut self, bytes: &[u8]) {
         self.0.extend_from_slice(bytes);
         // Cut at twice the length: each byte is moved once at most.
-        if self.0.len() >= 2 * KEPT {
-            self.0.drain(..self.0.len() - KEPT);
+        if self.0.len() >= 2 * TAIL_BYTES {
+            self.0.drain(..self.0.len() - TAIL_BYTES);
         }
     }
 
     fn text(&self) -> String {
-        let kept = &self.0[self.0.len().saturating_sub(KEPT)..];
-        String::from_utf8_lossy(kept).into_owned()
+        let end = &self.0[self.0.len().saturating_sub(TAIL_BYTES)..];
+        String::from_utf8_lossy(end).into_owned()
     }
 }
 
@@ -181,13 +181,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tail_is_the_end_and_no_longer_than_that() {
+    fn a_tail_has_only_the_last_bytes() {
         let mut tail = Tail::default();
-        let bytes: Vec<u8> = (0..5 * KEPT).map(|k| b'a' + (k % 26) as u8).collect();
+        let bytes: Vec<u8> = (0..5 * TAIL_BYTES).map(|k| b'a' + (k % 26) as u8).collect();
         for chunk in bytes.chunks(1000) {
             tail.push(chunk);
-            assert!(tail.0.len() < 2 * KEPT + 1000);
+            assert!(tail.0.len() < 2 * TAIL_BYTES + 1000);
         }
-        assert_eq!(tail.text().as_bytes(), &bytes[4 * KEPT..]);
+        assert_eq!(tail.text().as_bytes(), &bytes[4 * TAIL_BYTES..]);
     }
 }

@@ -1,4 +1,4 @@
-//! The report of a store, made of the store's files: records, study, and the header of the earlier report.
+//! The report of a store, built from its files: records, study, and the header of the earlier report.
 
 use std::collections::{BTreeSet, HashMap};
 use std::fs;
@@ -23,15 +23,15 @@ mod pictures;
 /// Name of the file with the last requested study.
 pub const STUDY: &str = "study.toml";
 
-/// A report that was rebuilt, or found as it should be.
+/// A report that was rebuilt or is up to date.
 pub struct Rebuilt {
     /// The records.
     pub records: Vec<Record>,
     /// The files that were written.
     pub files: Vec<PathBuf>,
-    /// Lines that hold no record.
+    /// Lines without a record.
     pub warnings: Vec<String>,
-    /// Meshes whose results have no picture, and why.
+    /// Meshes without pictures, with the reasons.
     pub undrawn: Vec<String>,
 }
 
@@ -49,7 +49,7 @@ pub fn rebuild(dir: &Path, registry: &Registry) -> Result<Rebuilt, Failure> {
         return Err(Failure { code: Exit::NothingMeasured, message });
     }
     let header = header(dir, &records, registry, &warnings);
-    // A study whose meshes or plug-ins are not at hand leaves the records in their order.
+    // If meshes or plug-ins of the study are missing, the records stay in their order.
     let items = Study::read(&dir.join(STUDY))
         .and_then(|study| study.items(registry, &Provenance::here()))
         .unwrap_or_default();
@@ -71,8 +71,8 @@ pub struct RunReport<'a> {
 }
 
 impl RunReport<'_> {
-    /// Writes the report, marked where the run goes on, with new pictures where `draws`. Without anything new the page
-    /// stays as it is.
+    /// Writes the report, marked while the run continues, with new pictures if `draws`. Without new records the page
+    /// stays unchanged.
     ///
     /// # Errors
     /// When the records cannot be read, or the report cannot be written.
@@ -104,11 +104,11 @@ fn write(
     draws: bool,
 ) -> Result<Rebuilt, Failure> {
     // Tables follow the order of the records: that of the study, not that of the runs.
-    let order = places(items);
+    let order = positions(items);
     records.sort_by_key(|record| order.get(&row_of(record)).copied().unwrap_or(usize::MAX));
     let mut undrawn = Vec::new();
     if draws {
-        // An input of the last study that cannot be read any more leaves its pictures as they are.
+        // Pictures of inputs that can no longer be read stay unchanged.
         let study = Study::read(&dir.join(STUDY)).ok();
         let sources = study.and_then(|study| study.sources().ok()).unwrap_or_default();
         undrawn = pictures::draw(dir, &records, &sources);
@@ -117,14 +117,14 @@ fn write(
     Ok(Rebuilt { records, files, warnings, undrawn })
 }
 
-/// What tells the place of a record in its study: mesh, method with parameters, level.
+/// The fields that decide the position of a record in its study: mesh, method with parameters, level.
 fn row_of(record: &Record) -> String {
     let Record { mesh, simplify, .. } = record;
     json!([mesh, simplify.method, simplify.variant, simplify.params, simplify.level]).to_string()
 }
 
-/// The place of each row of a study.
-fn places(items: &[Item]) -> HashMap<String, usize> {
+/// The position of each row of a study.
+fn positions(items: &[Item]) -> HashMap<String, usize> {
     let rows = items.iter().flat_map(|item| {
         let method = &item.method;
         item.levels.iter().map(move |level| {
@@ -142,7 +142,7 @@ pub fn write_study(dir: &Path, study: &Study) -> Result<(), Failure> {
     files::write(&dir.join(STUDY), study.to_text()?.as_bytes())
 }
 
-/// The records of a store or of a file, and the lines that hold none.
+/// The records of a store or of a file, and warnings about lines without a record.
 ///
 /// # Errors
 /// When the file cannot be read.
@@ -180,10 +180,10 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
             });
         }
     }
-    // Methods of this program are described as they are now, also those without a record, which the page names; those
-    // of plug-ins that are not named this time stay as they were.
+    // Methods of this program get their present descriptions, also methods without a record, which the page lists.
+    // Plug-ins that are not loaded this time keep their earlier descriptions.
     let ids: BTreeSet<&str> = records.iter().map(|r| r.simplify.method.as_str()).collect();
-    // A merged or cleared store can name methods that have no record any more.
+    // A merged or cleared store can list methods without records.
     header.methods.retain(|method| ids.contains(method.id.as_str()));
     let recorded = ids.into_iter().filter_map(|id| registry.entry(id));
     for entry in registry.entries().iter().chain(recorded) {

@@ -10,16 +10,15 @@ use medial_reports::{PictureStrip, Record, View3d, file_inside, picture_strips};
 
 use crate::study::source::{Input, Source};
 
-/// Pixels of a panel, and panels next to each other: a page of usual width shows them at about their size.
+/// Pixels of a panel, and panels in a row: a page of usual width shows them at about their size.
 const PANEL: [usize; 2] = [236, 192];
 const ACROSS: usize = 6;
 
-/// Draws the strips of some records into the folder of their report. What cannot be drawn, since an input is gone
-/// or changed, is left out, and the reason returned. What stands there already is not drawn again: its name tells what
-/// it shows.
+/// Draws the strips of some records into the folder of their report. Strips whose input is missing or changed are
+/// skipped, and the reasons returned. Existing strips are not drawn again: their names identify their content.
 pub fn draw(dir: &Path, records: &[Record], sources: &[Source]) -> Vec<String> {
     let mut strips = picture_strips(records);
-    // Names hold a hash of the content: a file that is there is the right one.
+    // Names contain a hash of the content: an existing file is the right one.
     strips.retain(|strip| !dir.join(&strip.file).exists() || !dir.join(strip.view_file()).exists());
     if strips.is_empty() {
         return vec![];
@@ -30,7 +29,7 @@ pub fn draw(dir: &Path, records: &[Record], sources: &[Source]) -> Vec<String> {
         .collect();
     (strips.iter())
         .filter_map(|wanted| {
-            // The hash tells whether the file still holds the surface that was measured.
+            // By the hash of the surface that was measured.
             let input = wanted.mesh_hash.as_ref().and_then(|hash| inputs.get(hash));
             let why = draw_strip(dir, wanted, input).err()?;
             Some(format!("no pictures of {}: {why}", wanted.mesh))
@@ -39,11 +38,11 @@ pub fn draw(dir: &Path, records: &[Record], sources: &[Source]) -> Vec<String> {
 }
 
 fn draw_strip(dir: &Path, wanted: &PictureStrip, input: Option<&Input>) -> Result<(), String> {
-    let input = input.ok_or("its surface is not at hand as it was measured")?;
+    let input = input.ok_or("the measured surface is missing or has changed")?;
     let mut axes = Vec::new();
     for (artifact, _) in &wanted.panels {
         let path = file_inside(dir, artifact);
-        let path = path.ok_or_else(|| format!("{artifact} leads out of the folder"))?;
+        let path = path.ok_or_else(|| format!("{artifact}: not inside the folder"))?;
         let loaded = medial::complex::read(&path);
         axes.push(loaded.map_err(|error| format!("{}: {error}", path.display()))?.mesh);
     }
@@ -85,7 +84,7 @@ fn picture(
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {
-    // The folder of the plots is made by the report, which is written later.
+    // The report creates this folder, but is written later.
     let folder = path.parent().unwrap_or(path);
     let written = std::fs::create_dir_all(folder)
         .and_then(|()| write_atomically(path, |out| out.write_all(bytes)));

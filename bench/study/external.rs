@@ -1,9 +1,9 @@
-//! Results computed elsewhere: files and folders of a user as results of a named method.
+//! External results: files and folders of a user as results of a named method.
 //!
-//! A file is a pseudo-method: on its mesh it answers one number of spheres, that which the file has, and is
-//! evaluated like the rest. A folder holds `MESH.ma` or `MESH-COUNT.ma` for the meshes of the study, and may
-//! hold `method.toml` with the claims of its authors. A surface in place of a medial mesh is the decimation
-//! baseline. Everything but the claimed seconds is measured here.
+//! A file is a pseudo-method: it has one result with its number of spheres on its mesh, evaluated like all others.
+//! A folder holds `MESH.ma` or `MESH-COUNT.ma` for the meshes of the study, and may hold `method.toml` with the
+//! claims of its authors. A surface instead of a medial mesh is the decimation baseline. Everything but the claimed
+//! seconds is measured here.
 
 use std::collections::{BTreeMap, HashSet};
 use std::fmt::Display;
@@ -19,7 +19,7 @@ use medial::simplifier::{
 };
 use medial::surface::Side;
 use medial::{complex, surface};
-use medial_reports::{Target, check_regular};
+use medial_reports::{Target, check_regular, significant};
 use serde::{Deserialize, Serialize};
 
 use crate::plugin::{OwnSeconds, reach};
@@ -30,41 +30,41 @@ use crate::study::{Study, StudyError};
 /// Id of the pseudo-method.
 pub const GIVEN: &str = "given";
 
-/// A file that stands in the tables under a name.
+/// An external result with its name in tables.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Given {
+pub struct ExternalResult {
     /// Name in tables.
     pub name: String,
     /// The medial mesh.
     pub file: PathBuf,
-    /// Name of the mesh that it is an axis of; needed where there are several.
+    /// Name of its mesh; required with several meshes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mesh: Option<String>,
-    /// How units are found.
+    /// Conversion of units.
     #[serde(default = "auto")]
     pub fit: FitBy,
-    /// Where radii come from.
+    /// Origin of the radii.
     #[serde(default)]
     pub radii: RadiiFrom,
-    /// Whether lines are taken as they are where the header announces another number of them.
+    /// Whether to read all lines where the header states a different number.
     #[serde(default)]
     pub lenient: bool,
-    /// Which medial mesh is meant of several in one file, from 1.
+    /// Number of the medial mesh in a file with several, from 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub block: Option<usize>,
 }
 
-/// Other programs write in other units, and no option of a command line says so for one file of many.
+/// Other programs use other units, and no option of the command line sets them for one file of many.
 fn auto() -> FitBy {
     FitBy::Auto
 }
 
-impl Given {
+impl ExternalResult {
     /// Reads `NAME=FILE` or `NAME@MESH=FILE`.
     ///
     /// # Errors
-    /// In words, where there is no name or no file.
+    /// When the name or the file is missing.
     pub fn parse(text: &str) -> Result<Self, String> {
         // At the first `=`: names of files may have others, names of methods none.
         let (name, file) = text.split_once('=').unwrap_or_default();
@@ -74,7 +74,7 @@ impl Given {
         };
         if name.trim().is_empty() || file.is_empty() || mesh.as_deref() == Some("") {
             return Err(format!(
-                "--given {text}: write NAME=FILE.ma, or NAME@MESH=FILE.ma with several meshes"
+                "--given {text}: expected NAME=FILE.ma, or NAME@MESH=FILE.ma with several meshes"
             ));
         }
         let (name, file) = (name.trim().to_owned(), PathBuf::from(file));
@@ -83,7 +83,7 @@ impl Given {
     }
 }
 
-/// The claims in a folder's `method.toml`. Nothing else about its results is taken from it.
+/// The claims in a folder's `method.toml`. Everything else about its results is measured.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Claims {
@@ -100,16 +100,15 @@ const CLAIMS: &str = "method.toml";
 /// Extensions of external results.
 const EXTENSIONS: [&str; 5] = ["ma", "ply", "off", "obj", "stl"];
 
-impl Given {
+impl ExternalResult {
     fn refused(&self, why: impl Display) -> StudyError {
         StudyError::Value(format!("given `{}`: {why}", self.name))
     }
 
-    /// The files of a folder with the meshes that they belong to, by name, and the claims; files of no
-    /// mesh of the study are passed over.
+    /// The files of a folder with the names of their meshes, and the claims. Skips files without a mesh in the study.
     ///
     /// # Errors
-    /// In words, when the folder or its claims cannot be read, or no file belongs to a mesh.
+    /// When the folder or its claims cannot be read, or no file belongs to a mesh.
     pub fn in_folder(
         &self,
         folder: &Path,
@@ -136,7 +135,7 @@ impl Given {
                         || rest.strip_prefix('-').is_some_and(|count| count.parse::<u64>().is_ok())
                 })
             });
-            // `box-8` is a mesh of its own where the study has one: the longest name wins.
+            // A study may have both `box` and `box-8`: the longest name wins.
             let mesh = belonging.max_by_key(|mesh| mesh.len());
             if let Some(mesh) = mesh.filter(|_| EXTENSIONS.contains(&extension.as_str())) {
                 files.push(Self { file, mesh: Some(mesh.clone()), ..self.clone() });
@@ -158,17 +157,17 @@ impl Given {
 medial::parameters! {
     /// Parameters of the pseudo-method.
     #[derive(Clone, Debug)]
-    pub struct GivenParams {
+    pub struct ExternalParams {
         /// The medial mesh.
         file: PathBuf = PathBuf::new(), "path";
-        /// How units are found.
+        /// Conversion of units.
         fit: FitBy = FitBy::None, "none, similarity or auto";
-        /// Where radii come from.
+        /// Origin of the radii.
         radii: RadiiFrom = RadiiFrom::File, "file or surface";
         /// Counts of the header may be wrong.
         #[serde(skip_serializing_if = "std::ops::Not::not")]
         lenient: bool = false, "true or false";
-        /// Which of several medial meshes in one file, from 1.
+        /// Number of the medial mesh in a file with several, from 1.
         #[serde(skip_serializing_if = "Option::is_none")]
         block: Option<usize> = None, "number";
         /// Full name of the method, as claimed.
@@ -180,7 +179,7 @@ medial::parameters! {
         /// Seconds as claimed.
         #[serde(skip_serializing_if = "Option::is_none")]
         claimed_seconds: Option<f64> = None, "seconds";
-        /// Names under which the same bytes are given, too.
+        /// Further names of external results with the same bytes.
         #[serde(skip_serializing_if = "String::is_empty")]
         same_as: String = String::new(), "names";
     }
@@ -193,29 +192,29 @@ pub fn fingerprint(params: &Params) -> Option<String> {
 }
 
 /// The pseudo-method.
-pub fn method() -> Method<GivenParams> {
+pub fn method() -> Method<ExternalParams> {
     let info = MethodInfo::new(GIVEN, "A file of another program")
         .summary(
-            "Simplifies nothing: a medial mesh from a file, judged like the results of methods.",
+            "An external result: a medial mesh from a file, evaluated like the results of methods.",
         )
         .published("the file as it is")
-        .params(GivenParams::describe());
+        .params(ExternalParams::describe());
     Method::new(info, prepare)
 }
 
 fn prepare<'s>(
     shape: &'s Shape,
-    params: GivenParams,
+    params: ExternalParams,
     _run: &RunContext,
 ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
-    let GivenParams { file, same_as, fit, radii, lenient, block, claimed_seconds, .. } = params;
+    let ExternalParams { file, same_as, fit, radii, lenient, block, claimed_seconds, .. } = params;
     let options = AxisOptions { lenient, block, radii, fit };
     let read = read_axis(&file, shape, options);
     let (loaded, _) = read.map_err(|error| SimplifyError::Parameter(error.to_string()))?;
-    // How the file was read belongs to the result: it decides the numbers.
+    // Notes of the reader belong to the result, since they affect its numbers.
     let (mesh, mut remarks) = loaded.with_remarks();
     if !same_as.is_empty() {
-        remarks.push(format!("the same bytes are given as {same_as}, too"));
+        remarks.push(format!("has the same bytes as {same_as}"));
     }
     let units = *shape.normalisation();
     let mesh = mesh.transformed(1.0 / units.diagonal, |p| units.forward(p));
@@ -225,7 +224,7 @@ fn prepare<'s>(
             Level::Published => {}
             Level::Spheres(count) if count == spheres => {}
             _ => {
-                let why = format!("the file has {spheres} spheres, and no other level");
+                let why = format!("the file has only the level of {spheres} spheres");
                 return Err(SimplifyError::unsupported(why));
             }
         }
@@ -240,13 +239,13 @@ fn prepare<'s>(
     }))
 }
 
-/// A file that was looked at.
-pub(crate) struct GivenFile {
+/// A file that was read.
+pub(crate) struct ExternalFile {
     /// Name of the mesh in tables.
     pub mesh: String,
     /// Name of the method in tables.
     name: String,
-    params: GivenParams,
+    params: ExternalParams,
     /// SHA-256 of its bytes.
     hash: String,
     /// Number of spheres.
@@ -254,13 +253,16 @@ pub(crate) struct GivenFile {
 }
 
 impl Study {
-    /// The given files with the meshes that they belong to, of the names of all meshes.
+    /// The external results with their meshes, among the names of all meshes.
     ///
     /// # Errors
     /// [`StudyError::Value`] for a file that cannot be read or belongs to no mesh, and for two of one name.
-    pub(crate) fn given_files(&self, meshes: &[String]) -> Result<Vec<GivenFile>, StudyError> {
-        let mut files: Vec<GivenFile> = Vec::new();
-        let mut all: Vec<(Given, Claims)> = Vec::new();
+    pub(crate) fn external_files(
+        &self,
+        meshes: &[String],
+    ) -> Result<Vec<ExternalFile>, StudyError> {
+        let mut files: Vec<ExternalFile> = Vec::new();
+        let mut all: Vec<(ExternalResult, Claims)> = Vec::new();
         for given in &self.given {
             let folder = self.resolved(&given.file);
             if folder.is_dir() {
@@ -274,15 +276,15 @@ impl Study {
         // By name, mesh and count: several counts of one method are one curve.
         for (given, claims) in all {
             let mesh = mesh_of(&given, meshes)?;
-            let file = self.look_at(given, claims, mesh)?;
-            let GivenFile { name, mesh, spheres, .. } = &file;
+            let file = self.read_result(given, claims, mesh)?;
+            let ExternalFile { name, mesh, spheres, .. } = &file;
             let is_method = self.methods.iter().any(|method| method.name.as_ref() == Some(name));
             let is_file = files
                 .iter()
                 .any(|other| (&other.mesh, &other.name, &other.spheres) == (mesh, name, spheres));
             if is_method || is_file {
                 let message =
-                    format!("two methods are named `{name}` on {mesh} at {spheres} spheres");
+                    format!("{mesh}, {spheres} spheres: two results named `{name}`; rename one");
                 return Err(StudyError::Value(message));
             }
             files.push(file);
@@ -297,13 +299,18 @@ impl Study {
         Ok(files)
     }
 
-    fn look_at(&self, given: Given, claims: Claims, mesh: String) -> Result<GivenFile, StudyError> {
+    fn read_result(
+        &self,
+        given: ExternalResult,
+        claims: Claims,
+        mesh: String,
+    ) -> Result<ExternalFile, StudyError> {
         let path = self.resolved(&given.file);
         // The worker that reads it has another working folder.
         let path = std::path::absolute(&path).unwrap_or(path);
         // One read: the hash is that of the bytes whose spheres are counted.
         let bytes = surface::content(&path).map_err(|error| given.refused(error))?;
-        let Given { fit, radii, lenient, block, .. } = given;
+        let ExternalResult { fit, radii, lenient, block, .. } = given;
         let options = AxisOptions { lenient, block, radii, fit }.read_options();
         let loaded = read_external(&path, &bytes, options).map_err(|why| given.refused(why))?;
         let spheres = loaded.mesh.spheres.len();
@@ -314,7 +321,7 @@ impl Study {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let claimed_seconds = seconds.get(&*stem).copied();
         let (file, same_as) = (path.to_string_lossy().into_owned().into(), String::new());
-        let params = GivenParams {
+        let params = ExternalParams {
             file,
             fit,
             radii,
@@ -325,24 +332,29 @@ impl Study {
             claimed_seconds,
             same_as,
         };
-        Ok(GivenFile { mesh, name: given.name, params, hash: hex_digest(&bytes), spheres })
+        Ok(ExternalFile { mesh, name: given.name, params, hash: hex_digest(&bytes), spheres })
     }
 
-    /// The numbers of spheres of the given files, from many to few.
+    /// The numbers of spheres of the external results, descending.
     ///
     /// # Errors
     /// For a file that cannot be read.
-    pub fn given_counts(&self) -> Result<Vec<usize>, StudyError> {
+    pub fn external_counts(&self) -> Result<Vec<usize>, StudyError> {
         let sources = self.sources()?;
-        let files = self.given_files(&crate::study::unique_names(&sources))?;
+        let files = self.external_files(&crate::study::unique_names(&sources))?;
         let mut counts: Vec<usize> = files.iter().map(|file| file.spheres).collect();
         counts.sort_unstable_by(|a, b| b.cmp(a));
         counts.dedup();
         Ok(counts)
     }
 
-    /// The item that judges a given file.
-    pub(crate) fn given_item(&self, scene: SceneSpec, file: &GivenFile, here: &Provenance) -> Item {
+    /// The item that evaluates an external result.
+    pub(crate) fn external_item(
+        &self,
+        scene: SceneSpec,
+        file: &ExternalFile,
+        here: &Provenance,
+    ) -> Item {
         let params = serde_json::to_value(&file.params).and_then(serde_json::from_value);
         let method = MethodSpec {
             id: GIVEN.to_owned(),
@@ -358,16 +370,17 @@ impl Study {
 }
 
 /// The mesh that a file belongs to.
-fn mesh_of(given: &Given, meshes: &[String]) -> Result<String, StudyError> {
+fn mesh_of(given: &ExternalResult, meshes: &[String]) -> Result<String, StudyError> {
     let name = &given.name;
     let message = match (&given.mesh, meshes) {
         (Some(mesh), _) if meshes.contains(mesh) => return Ok(mesh.clone()),
         (Some(mesh), _) => {
-            format!("given `{name}`: no mesh is called `{mesh}`; there are: {}", meshes.join(", "))
+            let known = meshes.join(", ");
+            format!("given `{name}`: unknown mesh `{mesh}` (expected one of: {known})")
         }
         (None, [mesh]) => return Ok(mesh.clone()),
         (None, _) => format!(
-            "given `{name}`: there are {} meshes; say which it belongs to, as in --given {name}@{}={}",
+            "given `{name}`: no mesh named (found {} meshes); write --given {name}@{}={}",
             meshes.len(),
             meshes.first().map_or("MESH", String::as_str),
             given.file.display()
@@ -376,33 +389,32 @@ fn mesh_of(given: &Given, meshes: &[String]) -> Result<String, StudyError> {
     Err(StudyError::Value(message))
 }
 
-/// How far from the middle of its surface a medial mesh reaches, in diagonals, if it is no slip.
+/// Plausible extents of a medial mesh from the middle of its surface, in diagonals.
 const SMALLEST: f64 = 0.01;
 const LARGEST: f64 = 5.0;
 
-/// Medians of the difference between radii and distances to the surface, as fractions of the diagonal: from here on other
-/// units are tried, and from here on it is said that something is wrong though none fit.
+/// Medians of the difference between radii and distances to the surface, as fractions of the diagonal: above the first,
+/// other units are tried, and above the second, a misfit gives a warning even if no units fit.
 const DOUBTFUL: f64 = 0.01;
 const WRONG: f64 = 0.05;
 
 /// A radius below this fraction of the diagonal is that of a point on the surface.
 const ON_SURFACE: f64 = 1e-9;
 
-/// How a medial mesh from a file is read and brought to its surface.
+/// Options of reading a medial mesh and fitting it to its surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Args)]
 #[serde(default, deny_unknown_fields)]
 pub struct AxisOptions {
-    /// Take the lines of a medial mesh as they are where its header announces another number of them.
+    /// Read all lines of a medial mesh whose header states a different number.
     #[arg(long)]
     pub lenient: bool,
-    /// Which medial mesh is meant of a file to which several were appended, from 1.
+    /// Read the K-th medial mesh of a file that holds several, counted from 1.
     #[arg(long, value_name = "K")]
     pub block: Option<usize>,
-    /// Where radii come from: `surface` takes the distance of each centre to the surface, for files without radii
-    /// or with other numbers in their place.
+    /// Read radii from the file, or compute them where it has none or other numbers instead.
     #[arg(long, value_enum, default_value_t)]
     pub radii: RadiiFrom,
-    /// The units of the medial mesh: those of the surface, or whatever scale and shift fit it best, which are said.
+    /// Convert the units of the medial mesh to those of the surface, and print the scale and shift.
     #[arg(long, value_enum, default_value_t)]
     pub fit: FitBy,
 }
@@ -418,37 +430,36 @@ impl AxisOptions {
     }
 }
 
-/// Where radii come from.
+/// Origin of radii.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RadiiFrom {
     /// From the file.
     #[default]
     File,
-    /// From the surface.
+    /// The distance of each centre to the surface.
     Surface,
 }
 
-/// How units are found.
+/// Conversion of units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FitBy {
     /// The file is in the units of the surface.
     #[default]
     None,
-    /// By the uniform scale and the shift under which spheres and surface fit.
+    /// Apply the uniform scale and the shift that fit the spheres to the surface.
     Similarity,
-    /// The same, if the file does not fit as it is and does so then.
+    /// As `similarity`, for files that fit only after scaling.
     Auto,
 }
 
-/// Why a file gives no medial mesh for a surface, in words that name it.
+/// The reason for which a file has no medial mesh for a surface, with its name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct AxisError(String);
 
-/// Reads a medial mesh that was made for a shape, in input units, and the change of units that brought it there, if one
-/// was asked for.
+/// Reads a medial mesh of a shape in input units, and the requested change of units.
 ///
 /// # Errors
 /// When it cannot be read, has no sphere, or cannot belong to the shape.
@@ -465,18 +476,18 @@ pub fn read_axis(
         return Err(named(&"no sphere"));
     }
     if from_surface {
-        // What stands in their place may be anything.
+        // The file may have any other numbers in their place.
         loaded.mesh.spheres.iter_mut().for_each(|sphere| sphere.radius = 0.0);
     }
     let reach = reach(&loaded.mesh, shape).map_err(|why| named(&why))?;
-    // Without radii there is nothing to compare distances with: only scales that tools use can be tried.
+    // Without radii, distances have nothing to compare with: only scales that tools use are tried.
     let fit = match (options.fit, from_surface) {
         (FitBy::None, _) => None,
         (FitBy::Similarity, false) => Some(shape.fit(&loaded.mesh).map_err(|error| named(&error))?),
         (FitBy::Auto, false) => shape.fit_if_needed(&loaded.mesh).map_err(|error| named(&error))?,
         (FitBy::Similarity | FitBy::Auto, true) => {
             let fit = shape.fit_of_points(&loaded.mesh).map_err(|error| named(&error))?;
-            Some(fit.ok_or_else(|| named(&"without radii only the cubes that tools write are tried, and none of them fits the surface"))?)
+            Some(fit.ok_or_else(|| named(&"no fitting units found; give a file with radii"))?)
         }
     };
     if let Some(fit) = &fit {
@@ -493,24 +504,24 @@ pub fn read_axis(
     Ok((loaded, fit))
 }
 
-/// Reads a medial mesh, or a surface as one of spheres without extent: the union of its slabs is the
-/// surface itself. The bytes are those of the file `path`, which is not opened.
+/// Reads a medial mesh, or a surface as spheres of radius 0: the union of its slabs is the surface
+/// itself. `bytes` is the content of the file `path`, which is not opened.
 ///
 /// # Errors
-/// In words that name the file.
+/// Names the file.
 fn read_external(path: &Path, bytes: &[u8], options: ReadOptions) -> Result<LoadedMa, String> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     let is_surface = match extension.as_str() {
         "off" | "stl" => return read_surface(path, bytes),
         "ply" => true,
-        // Taken for a surface, a medial mesh without radii would have spheres of radius 0.
+        // Read as a surface, a medial mesh without radii would have spheres of radius 0.
         "obj" => !lists_edges(bytes),
         _ => false,
     };
     // First as a medial mesh, because every medial mesh with faces would pass as a surface.
     let read = complex::read_content(path, bytes, options).map_err(|error| error.to_string());
     match read {
-        // Without radii it is a surface. If it is neither, the first error is the more telling one.
+        // Without radii it is a surface. If it is neither, the first error is the more useful one.
         Err(why) if is_surface => read_surface(path, bytes).map_err(|_| why),
         read => read,
     }
@@ -521,20 +532,20 @@ fn read_surface(path: &Path, bytes: &[u8]) -> Result<LoadedMa, String> {
     let spheres = surface.vertices.iter().map(|&v| Sphere::new(v, 0.0)).collect();
     let mesh = MedialMesh::from_simplices(spheres, vec![], surface.faces);
     let mesh = mesh.map_err(|error| format!("{}: {error}", path.display()))?;
-    let notes = vec!["a surface: measured as spheres of radius 0".to_owned()];
+    let notes = vec!["read a surface as spheres of radius 0".to_owned()];
     Ok(LoadedMa { mesh, notes, warnings: Vec::new() })
 }
 
-/// Whether the lines `l` of an `.obj` file are the edges of a medial mesh: there is no face, or a line is
-/// the side of one.
-// In a surface they are the edges without a face, which some modellers leave behind.
+/// Whether the lines `l` of an `.obj` file are the edges of a medial mesh: it has no face, or a line is
+/// the side of a face.
+// In a surface they are edges without a face, which some modellers write.
 fn lists_edges(obj: &[u8]) -> bool {
     let (mut edges, mut sides) = (HashSet::new(), Vec::new());
     for line in obj.split(|&byte| byte == b'\n') {
         let line = String::from_utf8_lossy(line);
         let mut words = line.split_whitespace();
         let keyword = words.next();
-        // Behind a slash stand texture coordinates and normals.
+        // Texture coordinates and normals follow a slash.
         let corners = words.map_while(|word| word.split('/').next()?.parse().ok());
         let corners: Vec<u32> = corners.collect();
         // Sorted pairs: a side is the same edge in both directions.
@@ -555,13 +566,14 @@ fn take_radii(loaded: &mut LoadedMa, shape: &Shape) -> Result<(), String> {
     let radii = shape.distances(&centres).map_err(|error| error.to_string())?;
     if radii.iter().all(|&radius| radius <= ON_SURFACE * units.diagonal) {
         return Err(
-            "every point is on the surface: it is that surface, or a sample of it".to_owned()
+            "every point is on the surface; give a medial mesh, not samples of the surface"
+                .to_owned(),
         );
     }
     for (sphere, radius) in loaded.mesh.spheres.iter_mut().zip(radii) {
         sphere.radius = radius;
     }
-    loaded.notes.push("every radius is the distance of its centre to the surface".to_owned());
+    loaded.notes.push("computed radii as distances of the centres to the surface".to_owned());
     let normal: Vec<_> = centres.iter().map(|&centre| units.forward(centre)).collect();
     // A separate view: its substrates must not be listed as used by a method.
     let sides = shape.view().inside_test().sides(&normal);
@@ -569,13 +581,13 @@ fn take_radii(loaded: &mut LoadedMa, shape: &Shape) -> Result<(), String> {
     if outside > 0 {
         let all = centres.len();
         loaded.warnings.push(format!(
-            "{outside} of {all} centres are outside of the surface: is it in the same units? `--fit similarity` finds others"
+            "{outside} of {all} centres are outside of the surface; find other units by --fit similarity"
         ));
     }
     Ok(())
 }
 
-/// Why a medial mesh may not belong to its surface as it is, if there is a reason to think so.
+/// A warning for a medial mesh that probably does not belong to its surface, or has other units.
 fn doubts(
     mesh: &MedialMesh,
     shape: &Shape,
@@ -596,26 +608,25 @@ fn doubts(
         if fit.misfit.is_some_and(|misfit| misfit <= DOUBTFUL) {
             let found = percent(fit.misfit.unwrap_or_default());
             return Ok(Some(format!(
-                "{differ}, by {found} in other units ({}; {}): `--fit similarity` takes those",
+                "{differ}, by {found} in other units ({}; {}); convert them by --fit similarity",
                 fit.similarity, fit.source
             )));
         }
         // The middle of the surface is the origin.
         if !(SMALLEST..=LARGEST).contains(&reach) {
             return Ok(Some(format!(
-                "it reaches {reach:.2e} diagonals of the surface from the middle of that: is it in the same units? \
-                 No scale and shift was found that fits"
+                "reaches {reach:.2e} diagonals from the middle of the surface, and no scale and shift fits; check the \
+                 units and the surface"
             )));
         }
     }
-    Ok((misfit > WRONG).then(|| {
-        format!("{differ}: of another surface, or no radii (`--radii surface` takes the distances)")
-    }))
+    Ok((misfit > WRONG)
+        .then(|| format!("{differ}; check the surface, or compute radii by --radii surface")))
 }
 
-/// A fraction of the diagonal as a percentage with three decimals.
+/// A fraction of the diagonal as a percentage with three significant digits.
 pub fn percent(fraction: f64) -> String {
-    format!("{:.3} %", 100.0 * fraction)
+    format!("{} %", significant(100.0 * fraction, 3))
 }
 
 #[cfg(test)]
@@ -641,12 +652,12 @@ mod tests {
 
     #[test]
     fn a_word_names_the_method_the_mesh_and_the_file() {
-        let given = Given::parse("Q-MAT, authors@bear=out/x=1.ma").expect("a name and a file");
+        let given = ExternalResult::parse("Q-MAT, authors@bear=out/x=1.ma").expect("a result");
         assert_eq!((given.name.as_str(), given.mesh.as_deref()), ("Q-MAT, authors", Some("bear")));
         assert_eq!(given.file, PathBuf::from("out/x=1.ma"));
-        assert_eq!(Given::parse("a=b.ma").expect("both").mesh, None);
+        assert_eq!(ExternalResult::parse("a=b.ma").expect("both").mesh, None);
         for wrong in ["a", "=b.ma", "a=", "a@=b.ma", " @x=b.ma"] {
-            assert!(Given::parse(wrong).is_err(), "{wrong}");
+            assert!(ExternalResult::parse(wrong).is_err(), "{wrong}");
         }
     }
 }

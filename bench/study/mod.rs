@@ -1,10 +1,10 @@
-//! What to run: the matrix of a comparison as data, and its items.
+//! Studies: the matrix of a comparison as data, and its items.
 //!
-//! | file | holds |
+//! | file | content |
 //! |---|---|
-//! | `mod` | [`Study`], what a study file can say; its items and shards |
+//! | `mod` | [`Study`], the content of a study file; its items and shards |
 //! | `item` | [`Item`], all that decides a record, and its keys |
-//! | `source` | where meshes come from |
+//! | `source` | the origins of meshes |
 //! | `library` | published meshes by name |
 //! | `external` | results computed elsewhere |
 //! | `registry` | the methods by id |
@@ -24,44 +24,44 @@ use medial_reports::{Target, check_regular};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::provenance::{Provenance, hex_digest};
-use crate::study::external::Given;
+use crate::study::external::ExternalResult;
 use crate::study::item::{Dual, Item, Keep, Limits, Measure, MethodSpec, Noise, SceneSpec};
 use crate::study::library::{Library, PublicError};
 use crate::study::registry::{Entry, INITIAL, Registry};
 use crate::study::source::{Input, InputError, Source, did_you_mean};
 
-/// Items are ended after so many seconds unless told otherwise.
+/// Default time limit of an item, in seconds.
 const TIMEOUT: f64 = 300.0;
-/// No further level of a method is begun on a mesh after so many seconds, likewise.
+/// Default of `--budget`, in seconds.
 const BUDGET: f64 = 60.0;
 /// More jobs than this are rejected as implausible.
 const MOST_JOBS: usize = 1024;
 
-/// More repetitions than this are taken for a slip.
+/// More repetitions than this are rejected as implausible.
 const MOST_REPEATS: usize = 10_000;
 
-/// More surface samples than this are taken for a slip.
+/// More surface samples than this are rejected as implausible.
 pub const MOST_SAMPLES: usize = 10_000_000;
 
-/// More threads than this serve nobody and can exhaust the system.
+/// More threads than this can exhaust the system and are rejected.
 pub const MOST_THREADS: usize = 1024;
 
-/// Surface samples of a comparison unless told otherwise.
-// Fewer than `evaluate` takes, since it measures hundreds of results.
+/// Default number of surface samples of a comparison.
+// Fewer than in `evaluate`, since it measures hundreds of results.
 const SAMPLES: usize = 10_000;
-/// Depth of the volume difference in a comparison, likewise.
+/// Depth of the octree for the volume difference in a comparison.
 pub const VOLUME_DEPTH: u32 = 5;
 
 /// The matrix of a comparison.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Study {
-    /// Folder where relative paths start; the study file's own unless given.
+    /// Folder where relative paths start [default: the folder of the study file].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub folder: Option<PathBuf>,
     /// Surface files, `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     pub meshes: Vec<PathBuf>,
-    /// Sets of meshes beside those named: `builtin`, or what the library has. A text or a list of texts.
+    /// Further sets of meshes: `builtin`, or a set of the library. A text or a list of texts.
     #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "one_or_more")]
     pub dataset: Vec<String>,
     /// Numbers of spheres.
@@ -72,26 +72,24 @@ pub struct Study {
     /// diagonal, adds a row of meshes whose results are measured against the clean surface.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub noise: Vec<f64>,
-    /// Counts alone: no levels of the methods' own but those given to them, and no row of the
-    /// initial medial mesh.
+    /// Whether to skip the default sweeps of native levels and the initial medial mesh.
     pub counts_only: bool,
     /// Whether each method also runs at its published level.
     pub published: bool,
     /// Seed of every random choice.
     pub seed: u64,
-    /// How often each level is timed.
+    /// Number of timed repetitions of each level.
     pub repeat: usize,
     /// Boundary samples.
     pub sampling: Sampling,
     /// Triangulation of the dual Voronoi polygons.
     pub dual: Dual,
-    /// Surface samples of the evaluation, beside the vertices.
+    /// Surface samples of the evaluation, in addition to the vertices.
     pub samples: usize,
-    /// Width of the certified interval of each Hausdorff error, a fraction of the diagonal; none
-    /// unless given.
+    /// Width of the certified interval of each Hausdorff error, a fraction of the diagonal; `None` for no certificate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certify: Option<f64>,
-    /// Number of threads; all processors unless given.
+    /// Number of threads [default: all processors].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threads: Option<usize>,
     /// Limit of time for each item, in seconds.
@@ -100,24 +98,24 @@ pub struct Study {
     pub budget: f64,
     /// Number of items that run at the same time.
     pub jobs: usize,
-    /// Limit of memory in megabytes; three quarters of the machine's unless given.
+    /// Limit of memory in megabytes [default: three quarters of the machine's].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub memory: Option<u64>,
     /// Which results stay on disk.
     pub keep: Keep,
     /// Plug-in files.
     pub plugins: Vec<PathBuf>,
-    /// Methods that start from what each filter leaves, beside those named.
+    /// Further methods that start from the output of each filter.
     pub after_filters: Vec<String>,
-    /// Methods with their parameters; all methods unless given.
+    /// Methods with their parameters [default: all but those on request].
     #[serde(rename = "method")]
     pub methods: Vec<StudyMethod>,
-    /// Files of other programs as results of named methods.
+    /// External results.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub given: Vec<Given>,
+    pub given: Vec<ExternalResult>,
 }
 
-/// A method of a study: a row of its own in tables and plots.
+/// A method of a study, one row in tables and one curve in plots.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StudyMethod {
@@ -132,7 +130,7 @@ pub struct StudyMethod {
     /// Numbers of spheres, in place of the study's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spheres: Option<Vec<usize>>,
-    /// Levels of the method's own, beside the counts.
+    /// Native levels, in addition to the counts.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<f64>,
     /// Whether it also runs at its published level, in place of the study's.
@@ -196,7 +194,7 @@ impl Study {
         let text = text.map_err(|error| failed(error.to_string()))?;
         let mut study: Self = toml::from_str(&text).map_err(|error| failed(error.to_string()))?;
         let own = path.parent().filter(|own| !own.as_os_str().is_empty());
-        // `study.toml` alone has an empty parent, of which there is no absolute path.
+        // The parent of `study.toml` is empty and has no absolute path.
         let own = own.unwrap_or(Path::new("."));
         let folder = study.folder.map_or(own.to_owned(), |folder| own.join(folder));
         study.folder = Some(std::path::absolute(&folder).unwrap_or(folder));
@@ -211,16 +209,16 @@ impl Study {
         toml::to_string(self).map_err(|error| StudyError::Value(format!("study: {error}")))
     }
 
-    /// A path as it is meant.
+    /// A path relative to the folder of the study; names of meshes stay.
     pub fn resolved(&self, path: &Path) -> PathBuf {
         match &self.folder {
-            // A name is no path.
+            // A name is not a path.
             Some(folder) if !Source::is_name(path) => folder.join(path),
             _ => path.to_owned(),
         }
     }
 
-    /// Refuses values that make no sense.
+    /// Refuses implausible values.
     ///
     /// # Errors
     /// [`StudyError::Value`] for the first of them.
@@ -229,29 +227,29 @@ impl Study {
         let mut paths = (self.meshes.iter().chain(&self.plugins).chain(&self.folder))
             .chain(self.given.iter().map(|given| &given.file));
         let fault = if !(1..=MOST_REPEATS).contains(&self.repeat) {
-            format!("--repeat {}: time each item 1 to {MOST_REPEATS} times", self.repeat)
+            format!("--repeat {}: expected a number from 1 to {MOST_REPEATS}", self.repeat)
         } else if !(1..=MOST_SAMPLES).contains(&self.samples) {
-            format!("--samples {}: ask for 1 to {MOST_SAMPLES} samples", self.samples)
+            format!("--samples {}: expected a number from 1 to {MOST_SAMPLES}", self.samples)
         } else if !(self.timeout > 0.0 && self.timeout.is_finite()) {
-            format!("--timeout {}: a positive number of seconds", self.timeout)
+            format!("--timeout {}: expected a positive number of seconds", self.timeout)
         } else if let Some(threads) = self.threads.filter(|n| !(1..=MOST_THREADS).contains(n)) {
-            format!("--threads {threads}: a number from 1 to {MOST_THREADS}")
+            format!("--threads {threads}: expected a number from 1 to {MOST_THREADS}")
         } else if let Some(path) = paths.find(|path| path.to_str().is_none()) {
             format!("{}: the name is not UTF-8; rename it", path.display())
         } else if !(self.budget > 0.0 && self.budget.is_finite()) {
-            format!("--budget {}: a positive number of seconds", self.budget)
+            format!("--budget {}: expected a positive number of seconds", self.budget)
         } else if !(1..=MOST_JOBS).contains(&self.jobs) {
-            format!("--jobs {}: run 1 to {MOST_JOBS} items at the same time", self.jobs)
+            format!("--jobs {}: expected a number from 1 to {MOST_JOBS}", self.jobs)
         } else if let Some(width) = self.certify.filter(|width| !(1e-6..1.0).contains(width)) {
-            format!("--certify {width}: a fraction of the diagonal from 1e-6 on")
+            format!("--certify {width}: expected a fraction of the diagonal from 1e-6 to 1")
         } else if self.memory == Some(0) {
-            "--memory 0: a positive number of megabytes".to_owned()
+            "--memory 0: expected a positive number of megabytes".to_owned()
         } else if let Some(eta) = self.noise.iter().find(|&&eta| !(eta > 0.0 && eta <= 0.1)) {
-            format!("noise {eta}: a fraction of the diagonal of at most 0.1")
+            format!("noise {eta}: expected a fraction of the diagonal of at most 0.1")
         } else if counts.chain([&self.spheres]).any(|counts| counts.contains(&0)) {
-            "--spheres 0: ask for at least one sphere".to_owned()
+            "--spheres 0: expected at least 1 sphere".to_owned()
         } else if let Some(bound) = self.max_error.iter().find(|&&e| !(e > 0.0 && e < 1.0)) {
-            format!("--max-error {bound}: a fraction of the diagonal between 0 and 1 is meant")
+            format!("--max-error {bound}: expected a fraction of the diagonal between 0 and 1")
         } else {
             return Ok(());
         };
@@ -274,7 +272,7 @@ impl StudyMethod {
         let mut method = Self::of(parts.next().unwrap_or_default());
         for part in parts {
             let (key, value) = part.split_once('=').ok_or_else(|| {
-                StudyError::Value(format!("--methods {text}: write ID:KEY=VALUE"))
+                StudyError::Value(format!("--methods {text}: expected ID:KEY=VALUE"))
             })?;
             method.params.set(key, value);
         }
@@ -282,36 +280,36 @@ impl StudyMethod {
     }
 }
 
-/// What is wrong with a study.
+/// An error in a study.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// The file cannot be read, or is no study.
+    /// The file cannot be read, or is not a study.
     #[error("{}: {message}", path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong, with the line.
+        /// The problem, with the line.
         message: String,
     },
-    /// A value makes no sense.
+    /// A value is implausible.
     #[error("{0}")]
     Value(String),
     /// An input is wrong.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// A set is unknown, or not here.
+    /// A set is unknown or not fetched.
     #[error(transparent)]
     Library(#[from] PublicError),
 }
 
-/// The message for an id that no method has, naming those that exist.
+/// The message for an unknown method, with the known ids.
 pub fn no_such_method(id: &str, known: &[String]) -> String {
     let meant = did_you_mean(id, known.iter().map(String::as_str));
-    format!("no method is called `{id}`{meant}; there are: {}", known.join(", "))
+    format!("unknown method `{id}`{meant} (expected one of: {})", known.join(", "))
 }
 
 impl Study {
-    /// The methods of the study: those named, or all there are.
+    /// The methods of the study, or by default all but those on request.
     ///
     /// # Errors
     /// [`StudyError::Value`] for an id that no method has, and for two rows of one name.
@@ -343,18 +341,19 @@ impl Study {
             if let Some(name) = &method.name
                 && found.iter().any(|(other, _)| other.name.as_ref() == Some(name))
             {
-                return Err(StudyError::Value(format!("two methods are named `{name}`")));
+                return Err(StudyError::Value(format!(
+                    "two methods have the name `{name}`; rename one"
+                )));
             }
             found.push((method.clone(), entry));
         }
         Ok(found)
     }
 
-    /// The inputs of the study: those named and those of the set; [`Source::examples`] where there
-    /// are none.
+    /// The inputs of the study: its meshes and sets, or else [`Source::examples`].
     ///
     /// # Errors
-    /// When one does not exist, or is no input.
+    /// When one does not exist or cannot be an input.
     pub fn sources(&self) -> Result<Vec<Source>, StudyError> {
         let mut sources = Vec::new();
         for mesh in &self.meshes {
@@ -385,10 +384,10 @@ impl Study {
         let methods = self.entries(registry)?;
         let sources = self.sources()?;
         let names = unique_names(&sources);
-        let files = self.given_files(&names)?;
+        let files = self.external_files(&names)?;
         let mut items = Vec::new();
         for (source, mesh) in sources.iter().zip(names) {
-            // Not by loading it: a refused file is a row of the results, not an error of the study.
+            // Without loading it: a refused file is a row of the results, not an error of the study.
             let hash = match source.path() {
                 Some(path) => hex_digest(&surface::content(path).map_err(InputError::from)?),
                 None => Input::load(source)?.hash,
@@ -423,7 +422,7 @@ impl Study {
                 }
             }
             let of_mesh = files.iter().filter(|file| file.mesh == scene.mesh);
-            items.extend(of_mesh.map(|file| self.given_item(scene.clone(), file, here)));
+            items.extend(of_mesh.map(|file| self.external_item(scene.clone(), file, here)));
         }
         Ok(items)
     }
@@ -458,7 +457,7 @@ impl Study {
             memory => memory / 4 * 3 / self.jobs.max(1) as u64,
         };
         let bytes = self.memory.map_or(machine, |megabytes| megabytes.saturating_mul(1_000_000));
-        // One that ends after the limit of time ends nothing.
+        // A budget beyond the time limit has no effect.
         let budget = Some(self.budget).filter(|&budget| budget < self.timeout);
         Limits { seconds: self.timeout, bytes, budget }
     }
@@ -490,11 +489,11 @@ impl Study {
             native.reverse();
         }
         levels.extend(native.into_iter().map(Target::Native));
-        // Fine levels take longest: where the order is free, they cost no coarser one its result.
+        // Fine levels take longest: last, they cannot cost coarser ones their results.
         if !info.incremental {
             levels.reverse();
         }
-        // Last and from loose to tight, since a search that does not end must cost nothing else.
+        // Last and from loose to tight, since an endless search must not cost other results.
         let mut bounds = self.max_error.clone();
         bounds.sort_by(|a, b| b.total_cmp(a));
         bounds.dedup();
@@ -505,9 +504,9 @@ impl Study {
 
 /// The share `I/N` of a study's items: every Nth one, beginning with the Ith.
 ///
-/// The place in the whole study decides, not what a store lacks: a shard that is
-/// run again continues with its own items. The start moves by one from mesh to mesh, so that no
-/// shard gets one method on all meshes where N divides the number of methods.
+/// The position in the whole study decides, independent of the store: a shard that runs again
+/// continues with the same items. The start moves by one from mesh to mesh, so that no shard gets
+/// one method on all meshes where N divides the number of methods.
 ///
 /// # Errors
 /// [`StudyError::Value`] where the text is not two numbers, the first from 1 to the second.
@@ -517,7 +516,7 @@ pub fn shard(text: &str, items: &[Item]) -> Result<Vec<Item>, StudyError> {
         (1..=of).contains(&number).then_some((number, of))
     });
     let (number, of) = parsed.ok_or_else(|| {
-        StudyError::Value(format!("--shard {text}: write I/N with I from 1 to N"))
+        StudyError::Value(format!("--shard {text}: expected I/N with I from 1 to N"))
     })?;
     let (mut own, mut mesh) = (Vec::new(), 0);
     for (place, item) in items.iter().enumerate() {
@@ -537,8 +536,8 @@ fn name_key(name: &str) -> String {
     medial_reports::file_stem(name).to_ascii_lowercase()
 }
 
-/// A name for each source, unlike every other even as the stem of a file: the file's stem, where
-/// that is not enough its name with the extension, then with its folder, then a number.
+/// A unique name for each source, also unique as the stem of a file: the file's stem, else its name
+/// with the extension, else with its folder, else with a number.
 pub(crate) fn unique_names(sources: &[Source]) -> Vec<String> {
     let mut names: Vec<String> = sources.iter().map(Source::name).collect();
     // Only names that collide grow: the others stay short in tables.

@@ -1,4 +1,4 @@
-//! The known methods: those of the program, and those of plug-in files.
+//! The known methods: built-in methods and plug-ins.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,19 +13,18 @@ use crate::provenance::hex_digest;
 /// Id of the pseudo-method that returns the initial medial mesh.
 pub const INITIAL: &str = "initial";
 
-/// Raised when the runner's own work changes what stands in records.
+/// Raised when a change of the runner changes records.
 const RUNNER: u32 = 1;
 
 /// Methods by id, in the order of the tables.
 pub struct Registry {
     entries: Vec<Entry>,
-    /// Entries that can be run but are not methods: the initial medial mesh as it is, files of other
-    /// programs, and every ordered pair of methods, run one after the other. Made eagerly, so that an id means the same in
-    /// a worker.
+    /// Entries that can be run but are not methods: the initial medial mesh, external results, and every ordered pair of
+    /// methods, run one after the other. Made eagerly, so that an id means the same in a worker.
     others: Vec<Entry>,
     /// The plug-in files that were added, as absolute paths.
     files: Vec<PathBuf>,
-    /// What loads plug-in files that are no declarations.
+    /// Loader of plug-in files in the host's language.
     loader: Option<Box<dyn ScriptLoader>>,
     /// Remarks on plug-ins, for the user.
     pub remarks: Vec<String>,
@@ -76,7 +75,7 @@ impl Entry {
         let filter = first.presentation.filter.unwrap_or(Level::Published);
         let chain = Chain::new(Arc::clone(&first.method), filter, Arc::clone(&then.method));
         let parts = [&first.fingerprint, &then.fingerprint];
-        // A chain is as external as its parts: one edited script makes another chain.
+        // A chain is as external as its parts: an edited script is a new version of it.
         let fingerprint = parts
             .iter()
             .any(|part| part.is_some())
@@ -88,11 +87,11 @@ impl Entry {
     }
 
     /// A hash that changes whenever the results of the method may. `binary` is the hash of the running
-    /// program, which stands for a method that came with it and has no version of its own.
+    /// program, which replaces the version of a built-in method without one.
     pub fn version(&self, binary: &str) -> String {
         let own = match (&self.version, &self.fingerprint) {
             (Some(version), None) => version.clone(),
-            // The program gives a plug-in its input and measures its output.
+            // The program writes the input of a plug-in and measures its output.
             (version, Some(fingerprint)) => {
                 let library = [medial::SOURCE_HASH, medial::geometry::SOURCE_HASH];
                 format!("{fingerprint} {} {}", library.join(" "), version.as_deref().unwrap_or(""))
@@ -118,7 +117,7 @@ impl Registry {
     /// The methods of a program.
     ///
     /// # Errors
-    /// In words, when two have one id.
+    /// When two methods have the same id.
     pub fn new(methods: Vec<Registered>) -> Result<Self, String> {
         let mut initial = Entry::new(initial::method().into(), None);
         initial.version = medial_methods::version(INITIAL);
@@ -129,7 +128,7 @@ impl Registry {
         for registered in methods {
             let id = &registered.method.info().id;
             if registry.entry(id).is_some() {
-                return Err(format!("two methods are called `{id}`; give one of them another id"));
+                return Err(format!("two methods have the id `{id}`; change one of them"));
             }
             registry.add(Entry::new(registered, None));
         }
@@ -197,7 +196,7 @@ impl Registry {
         &self.entries
     }
 
-    /// The methods that run where none is named: all but those on request.
+    /// The methods that run by default: all but those on request.
     pub fn usual(&self) -> impl Iterator<Item = &Entry> {
         self.entries.iter().filter(|entry| !entry.presentation.on_request)
     }

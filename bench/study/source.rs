@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::provenance::hex_digest;
 use crate::study::library::{Library, PublicError};
 
-/// Where a mesh comes from.
+/// Origin of a mesh.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
@@ -23,7 +23,7 @@ pub enum Source {
     BuiltIn {
         /// Id in the catalogue.
         id: String,
-        /// Resolution, in the shape's own meaning.
+        /// Resolution; its meaning depends on the shape.
         resolution: Option<u32>,
     },
     /// A mesh of the library.
@@ -37,11 +37,11 @@ pub enum Source {
     },
 }
 
-/// What an argument begins with that names a built-in shape.
+/// Prefix of the names of built-in shapes.
 const BUILT_IN: &str = "builtin:";
 /// A part with edges, a loop, a smooth body with limbs.
 const EXAMPLES: [&str; 3] = ["bracket", "torus", "blob"];
-/// What an argument begins with that names a mesh of the library.
+/// Prefix of the names of meshes of the library.
 const DATASET: &str = "dataset:";
 
 impl Source {
@@ -77,7 +77,7 @@ impl Source {
                 // Anything behind the second colon: a typing error must not become the default.
                 let resolution = text.parse().map_err(|_| {
                     InputError::BuiltIn(format!(
-                        "`{text}` is not a resolution: write builtin:ID:NUMBER"
+                        "wrong resolution `{text}`; write builtin:ID:NUMBER"
                     ))
                 })?;
                 (id, Some(resolution))
@@ -86,17 +86,16 @@ impl Source {
         Ok(Self::BuiltIn { id: id.to_owned(), resolution })
     }
 
-    /// Refuses what cannot be an input before anything is run: a file that is not there or cannot be
-    /// read, a shape or a resolution that does not exist.
+    /// Refuses missing and unreadable files, unknown shapes and resolutions out of range, before any run.
     ///
     /// # Errors
-    /// [`InputError`], which names it.
+    /// [`InputError`], which names the input.
     pub fn check(&self) -> Result<(), InputError> {
         match self {
             Self::File(path) | Self::Cached { path, .. } => {
                 let failed = |error| InputError::Read { path: path.clone(), error };
                 let kind = fs::metadata(path).map_err(failed)?;
-                // Opening one of these would wait for ever.
+                // Opening a pipe or a device could wait for ever.
                 if !kind.is_file() {
                     return Err(failed(io::Error::other("not a regular file")));
                 }
@@ -106,8 +105,7 @@ impl Source {
         }
     }
 
-    /// The built-in shapes that a comparison takes where none is named: few, so that it ends soon, on which methods
-    /// differ.
+    /// The default meshes of a comparison: few built-in shapes, so that it ends soon, on which methods differ.
     pub fn examples() -> Vec<Self> {
         EXAMPLES.map(|id| Self::BuiltIn { id: id.into(), resolution: None }).into()
     }
@@ -134,7 +132,7 @@ impl Source {
         }
     }
 
-    /// The set that the mesh belongs to, where it does.
+    /// The set of the mesh, if any.
     pub fn dataset(&self) -> Option<&str> {
         match self {
             Self::File(_) => None,
@@ -144,7 +142,7 @@ impl Source {
     }
 
     /// A longer name where [`Source::name`] is not unique: with the extension (depth 1), and with
-    /// the folder that holds the file (depth 2). For a name as it is written.
+    /// the folder that holds the file (depth 2). Names of built-in and library meshes stay the same.
     pub fn long_name(&self, depth: usize) -> String {
         let Self::File(path) = self else { return self.to_string() };
         let parts: Vec<_> = path
@@ -177,7 +175,7 @@ pub struct Input {
     pub hash: String,
     /// The surface, in input units.
     pub mesh: TriMesh,
-    /// What was found and repaired.
+    /// Defects and repairs.
     pub report: SurfaceReport,
     /// The exactly known medial axis, in input units.
     pub axis: Option<MedialMesh>,
@@ -220,7 +218,7 @@ impl Input {
         Ok(Self { name: source.name(), hash: hex_digest(&bytes), mesh, report, axis })
     }
 
-    /// The shape, normalised, with nothing built yet.
+    /// The normalised shape, without substrates.
     ///
     /// # Errors
     /// When the surface has no extent.
@@ -229,7 +227,7 @@ impl Input {
     }
 }
 
-/// A built-in shape and its resolution, the default one unless given.
+/// A built-in shape and its resolution, by default that of the shape.
 fn built_in(
     id: &str,
     resolution: Option<u32>,
@@ -238,7 +236,7 @@ fn built_in(
         let ids = medial_datasets::catalogue().into_iter().map(|shape| shape.id);
         let meant = did_you_mean(id, ids.collect::<Vec<_>>());
         InputError::BuiltIn(format!(
-            "no built-in shape is called `{id}`{meant}; `medial datasets list` names them all"
+            "unknown built-in shape `{id}`{meant}; list all names by `medial datasets list`"
         ))
     })?;
     let resolution = resolution.unwrap_or(shape.default_resolution);
@@ -246,24 +244,24 @@ fn built_in(
     if !range.contains(&resolution) {
         let (least, most) = (range.start(), range.end());
         return Err(InputError::BuiltIn(format!(
-            "resolution {resolution} is out of range: this shape takes {least} to {most}"
+            "builtin:{id}: wrong resolution (found {resolution}, expected {least} to {most})"
         )));
     }
-    // Estimated, because making the mesh is what would take too long.
+    // Estimated, because generating the mesh would take too long.
     let vertices = estimated_vertices(&shape, resolution);
     if vertices > MAX_VERTICES {
         return Err(InputError::BuiltIn(format!(
-            "resolution {resolution} would make about {vertices:.1e} vertices, above the most of \
-             {MAX_VERTICES:.0e}: ask for a coarser one"
+            "builtin:{id}: resolution {resolution} is too fine (about {vertices:.1e} vertices, at most \
+             {MAX_VERTICES:.0e})"
         )));
     }
     Ok((shape, resolution))
 }
 
-/// Built-in shapes of more vertices take hours in most verbs and are taken for a slip.
+/// Built-in shapes of more vertices take hours in most verbs and are rejected as implausible.
 const MAX_VERTICES: f64 = 2e6;
 
-/// A surface has vertices by the square of its resolution.
+/// The number of vertices grows with the square of the resolution.
 fn estimated_vertices(shape: &BuiltIn, resolution: u32) -> f64 {
     let times = f64::from(resolution) / f64::from(shape.default_resolution);
     if times <= 1.0 {
@@ -272,7 +270,7 @@ fn estimated_vertices(shape: &BuiltIn, resolution: u32) -> f64 {
     shape.mesh(shape.default_resolution).vertices.len() as f64 * times * times
 }
 
-/// Where the name of a file that is not there is that of a built-in shape.
+/// A hint for a missing file with the name of a built-in shape.
 fn meant_shape(path: &Path) -> String {
     let id = path.file_name().and_then(|name| medial_datasets::find(name.to_str()?));
     id.map_or(String::new(), |shape| format!("; the built-in shape is `builtin:{}`", shape.id))
@@ -285,7 +283,7 @@ fn surface_bytes(mesh: &TriMesh) -> Vec<u8> {
     coordinates.flat_map(f64::to_le_bytes).chain(indices.flat_map(|i| i.to_le_bytes())).collect()
 }
 
-/// Why an input cannot be used.
+/// The reason for which an input cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
     /// The file cannot be read.
@@ -293,7 +291,7 @@ pub enum InputError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         error: io::Error,
     },
     /// The surface is refused.
@@ -302,7 +300,7 @@ pub enum InputError {
     /// The library has no such mesh.
     #[error(transparent)]
     Library(#[from] PublicError),
-    /// There is no such built-in shape, or not at this resolution.
+    /// The built-in shape is unknown, or its resolution out of range.
     #[error("{0}")]
     BuiltIn(String),
 }
@@ -310,7 +308,7 @@ pub enum InputError {
 /// Smallest Jaro-Winkler similarity (1 for equal words) of a suggestion.
 const MIN_SIMILARITY: f64 = 0.8;
 
-/// `; did you mean ...?` for the known word that is most like the given one, or nothing.
+/// `; did you mean ...?` for the most similar known word, or an empty text.
 pub fn did_you_mean<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     // Ids have no capitals, and titles do.
     let word = word.to_lowercase();
@@ -328,7 +326,7 @@ mod tests {
     use super::did_you_mean;
 
     #[test]
-    fn only_what_is_alike_is_proposed() {
+    fn only_similar_words_are_proposed() {
         let known = ["angle", "lambda", "qmat", "pmat"];
         assert_eq!(did_you_mean("qamt", known), "; did you mean `qmat`?");
         assert_eq!(did_you_mean("Lamda", known), "; did you mean `lambda`?");

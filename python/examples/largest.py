@@ -1,8 +1,8 @@
-"""A method of one's own, beside the published ones.
+"""A method as a Python class, compared with the published ones.
 
     python largest.py                                                    # this comparison
     medial compare --plugins largest.py --methods largest-class,qmat     # the same from the command line
-    medial check --plugins largest.py largest-class                      # what every method must do
+    medial check --plugins largest.py largest-class                      # the conformance tests
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ class Largest:
     def prepare(self, shape: Shape, params: dict[str, Any], run: RunContext) -> None:
         """Once for a shape."""
         self.axis = shape.initial()
-        # Equal radii by number: the same bytes each time.
+        # Ties by number: the same bytes each time.
         order = np.argsort(-self.axis.radii, kind="stable")
         self.order = order[self.axis.radii[order] >= params["least"]]
 
     def at(self, level: Level) -> MedialAxis | Simplified:
         """Once for each level."""
         if level.spheres is None:
-            raise medial_axis.UnsupportedError("ask for a number of spheres")
+            raise medial_axis.UnsupportedError("give a number of spheres")
         if len(self.order) == 0:
             raise medial_axis.ParameterError("no ball is as large as `least`")
         keep = np.zeros(len(self.axis), bool)
@@ -45,7 +45,7 @@ class Largest:
         return self.axis.induced(keep)
 
 
-# Workers load this file for the class alone, so what it does as a program stands here.
+# Workers load this file for the class only.
 if __name__ == "__main__":
     report = medial_axis.compare(
         ["builtin:box", "builtin:torus"],

@@ -16,11 +16,11 @@ import medial_axis
 
 folder, picture = sys.argv[1:3] if len(sys.argv) > 2 else ("medial-report", "errors.png")
 results = medial_axis.load(folder)
-# At counts, whether they were met or not: the count that came is on the axis.
+# At counts, met or not: the axis shows the reached count.
 results = results[(results.level == "spheres") & results.hausdorff.notna()]
 figure, axes = plt.subplots(figsize=(7, 4.5), layout="constrained")
 for method, rows in results.groupby("method"):
-    # All meshes together, by what was asked: the median of each.
+    # The median over all meshes at each requested count.
     medians = rows.groupby("asked")[["spheres", "hausdorff"]].median().sort_values("spheres")
     axes.plot(medians.spheres, 100 * medians.hausdorff, marker="o", label=method)
 axes.set(xscale="log", yscale="log", xlabel="spheres", ylabel="Hausdorff error, % of the diagonal")

@@ -1,4 +1,4 @@
-"""Meshes of trimesh and Open3D, there and back. What is not installed is left out."""
+"""Meshes to and from trimesh and Open3D, if they are installed."""
 
 from __future__ import annotations
 
@@ -27,4 +27,4 @@ for round_trip in (trimesh_round_trip, open3d_round_trip):
     try:
         round_trip()
     except ImportError as error:
-        print(f"left out: {error}")
+        print(f"skipped: {error}")

@@ -1,4 +1,4 @@
-"""From a mesh to a hundred spheres, and what that cost. Give a file, or nothing for a built-in shape."""
+"""From a mesh to a hundred spheres, with the errors. The argument is a file; the default is a built-in shape."""
 
 import sys
 

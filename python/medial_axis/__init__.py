@@ -6,9 +6,8 @@
     axis = mesh.medial_axis().simplify("qmat", spheres=100)
     print(axis.evaluate())
 
-Lengths are in the units of the mesh, but for errors and for what methods of one's own are given: these are fractions of
-the bounding-box diagonal, as their documentation says. Arrays are n x 3 (points, float64; triangles, uint32, from 0).
-Arrays that an object gives are shared and read-only.
+Lengths are in the units of the mesh. Errors, and all inputs of your methods, are fractions of the bounding-box diagonal.
+Arrays are n x 3 (points, float64; triangles, uint32, from 0). Arrays of an object are shared and read-only.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Arguments, checked: what every long call takes, and arrays of the kind, shape and layout that the extension takes."""
+"""Checked arguments: those of every long call, and arrays of the kind, shape and layout that the extension requires."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy.typing as npt
 from .errors import InputError, ParameterError
 
 Progress = Callable[[str, "float | None"], object]
-"""Called with a stage, and the share of it that is done where that is known, from the thread that made the call."""
+"""Called with a stage and its completed share (None if unknown), in the thread of the call."""
 
 _Call = tuple[int, "int | None", "Progress | None"]
 
@@ -22,7 +22,7 @@ _Call = tuple[int, "int | None", "Progress | None"]
 def call(seed: int = 0, threads: int | None = None, progress: Progress | None = None) -> _Call:
     """Arguments of a long call, checked."""
     if progress is not None and not callable(progress):
-        raise ParameterError(f"progress: a function is needed, not a {type(progress).__name__}")
+        raise ParameterError(f"progress: expected a function, found a {type(progress).__name__}")
     seed = whole(seed, "seed", 0, 2**64 - 1)
     threads = None if threads is None else whole(threads, "threads", 1, 1024)
     return seed, threads, progress
@@ -33,9 +33,9 @@ def whole(value: Any, what: str, least: int, most: int) -> int:
     try:
         number = operator.index(value)
     except TypeError:
-        raise ParameterError(f"{what}: a whole number is needed, not {value!r}") from None
+        raise ParameterError(f"{what}: expected a whole number, found {value!r}") from None
     if not least <= number <= most:
-        raise ParameterError(f"{what} = {number}: it has to be from {least} to {most}")
+        raise ParameterError(f"{what} = {number}: expected {least} to {most}")
     return number
 
 
@@ -44,7 +44,7 @@ def real(value: Any, what: str) -> float:
     try:
         return float(value)
     except (TypeError, ValueError, OverflowError):
-        raise ParameterError(f"{what}: a number is needed, not {value!r}") from None
+        raise ParameterError(f"{what}: expected a number, found {value!r}") from None
 
 
 def path_text(path: Any, what: str = "path") -> str:
@@ -52,7 +52,7 @@ def path_text(path: Any, what: str = "path") -> str:
     try:
         text = os.fsdecode(path)
     except TypeError:
-        raise ParameterError(f"{what}: a path is needed, not a {type(path).__name__}") from None
+        raise ParameterError(f"{what}: expected a path, found a {type(path).__name__}") from None
     if "\0" in text:
         raise ParameterError(f"{what}: {text!r} has a zero byte")
     return text
@@ -63,7 +63,7 @@ def need(module: str, package: str) -> Any:
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        message = f"{package} is needed for this: pip install {package.lower()} ({error})"
+        message = f"{package} is not installed ({error}); run pip install {package.lower()}"
         raise ImportError(message, name=module) from error
 
 
@@ -78,7 +78,7 @@ def floats(value: Any, what: str, columns: int | None = 3) -> FloatArray:
     """An n x columns array of finite float64, or a plain list of n where `columns` is None."""
     array = _array(value, what)
     if array.dtype.kind not in "fiu":
-        raise InputError(f"{what}: numbers are needed, not an array of {array.dtype}")
+        raise InputError(f"{what}: expected numbers, found an array of {array.dtype}")
     array = _shaped(array, what, columns)
     result = np.ascontiguousarray(array, dtype=np.float64)
     if not np.isfinite(result).all():
@@ -91,16 +91,16 @@ def indices(value: Any, what: str, columns: int) -> IndexArray:
     """An n x columns array of indices, as uint32."""
     array = _array(value, what)
     if array.dtype.kind not in "iu" and array.size > 0:
-        raise InputError(f"{what}: indices are needed, not an array of {array.dtype}")
+        raise InputError(f"{what}: expected indices, found an array of {array.dtype}")
     array = _shaped(array, what, columns)
     if array.size > 0 and (int(array.min()) < 0 or int(array.max()) > _MOST):
         row = int(np.argwhere((array < 0) | (array > _MOST))[0][0])
-        raise InputError(f"{what}: row {row} has an index that names nothing: {array[row]}")
+        raise InputError(f"{what}: row {row} has an index out of range: {array[row]}")
     return np.ascontiguousarray(array, dtype=np.uint32)
 
 
 def same(ones: tuple[Any, ...], others: tuple[Any, ...]) -> bool:
-    """Whether arrays are equal bit by bit, as their hashes take them: 0.0 is not -0.0."""
+    """Whether arrays are equal bit by bit, like their hashes: 0.0 differs from -0.0."""
     return all(one.shape == other.shape and one.tobytes() == other.tobytes() for one, other in zip(ones, others))
 
 
@@ -108,24 +108,24 @@ def truths(value: Any, what: str, count: int) -> BoolArray:
     """`count` truth values."""
     array = _array(value, what)
     if array.dtype != np.bool_ or array.shape != (count,):
-        raise InputError(f"{what}: {count} truth values are needed, not an array of {array.dtype} with the shape {array.shape}")
+        raise InputError(f"{what}: expected {count} truth values, found an array of {array.dtype} with the shape {array.shape}")
     return array
 
 
 def _array(value: Any, what: str) -> npt.NDArray[Any]:
     try:
         return np.asarray(value)
-    except Exception as error:  # Whatever a foreign object raises when it is asked.
-        raise InputError(f"{what}: a {type(value).__name__} is no array: {error}") from error
+    except Exception as error:  # A foreign object may raise any exception.
+        raise InputError(f"{what}: a {type(value).__name__} is not an array ({error})") from error
 
 
 def _shaped(array: npt.NDArray[Any], what: str, columns: int | None) -> npt.NDArray[Any]:
     if columns is None:
         if array.ndim != 1:
-            raise InputError(f"{what}: a single row of numbers is needed, not the shape {array.shape}")
+            raise InputError(f"{what}: expected a single row of numbers, found the shape {array.shape}")
         return array
     if array.size == 0 and array.ndim <= 2:
         return array.reshape(0, columns)
     if array.ndim != 2 or array.shape[1] != columns:
-        raise InputError(f"{what}: the shape (n, {columns}) is needed, not {array.shape}")
+        raise InputError(f"{what}: expected the shape (n, {columns}), found {array.shape}")
     return array

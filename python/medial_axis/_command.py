@@ -1,4 +1,4 @@
-"""The command `medial`: how it runs in this process, and how it is started in another."""
+"""The command `medial`, in this process and in new ones."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import NoReturn
 
 from . import _medial
 
-#: Python, and what it does before the words of the command. The folder of the user is no place to import from: a file
-#: there may be called as a module is. With `python -m` it would be the first.
+#: The start of the command in a new process. It must not import from the user's folder, where a file may have the name
+#: of a module. With `python -m` that folder would be the first.
 STARTED_BY = [
     sys.executable,
     "-c",
@@ -20,7 +20,7 @@ def main() -> NoReturn:
     """Runs the command with the words of this process, and ends it."""
     words = sys.argv[1:]
     if words[:1] == ["worker"]:
-        # Standard output is for the supervisor: what classes print goes beside it.
+        # Standard output is for the supervisor: output of classes goes to standard error.
         sys.stdout = sys.stderr
     program, *arguments = STARTED_BY
     sys.exit(_medial.run_command(program, arguments, _medial.__file__, words))

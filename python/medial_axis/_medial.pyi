@@ -1,4 +1,4 @@
-"""The extension. Not for users: the modules beside it are."""
+"""The extension. Private: use the other modules of this package."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ __version__: str
 _Floats = npt.NDArray[np.float64]
 _Indices = npt.NDArray[np.uint32]
 
-# Seed, threads, and what is told of progress.
+# Seed, threads, and a function for progress.
 _Call = tuple[int, int | None, Callable[[str, float | None], object] | None]
 
 class Surface:

@@ -1,4 +1,4 @@
-"""What stands between classes of users and the extension: descriptions, checks, and words for exceptions."""
+"""Calls of the extension to classes of users: descriptions, checks, and texts of exceptions."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .axis import MedialAxis
 from .errors import ParameterError
 from .method import Level, MethodInfo, Param, RunContext, Shape, Simplified
 
-#: The file that is being loaded for its classes, if any: it must not start comparisons of its own.
+#: The file that is being loaded for its classes, if any: it must not start comparisons.
 loading: str | None = None
 
 
-class Answer(NamedTuple):
-    """What the extension reads."""
+class Output(NamedTuple):
+    """The result of `at` for the extension."""
 
     axis: _medial.Axis
     native_level: float | None
@@ -31,7 +31,7 @@ def describe(cls: Any) -> str:
     """The description of a class, as JSON."""
     info = getattr(cls, "info", None)
     if not isinstance(info, MethodInfo):
-        raise ParameterError(f"{cls!r} is no method: put @medial_axis.simplifier before the class")
+        raise ParameterError(f"{cls!r}: not a method; put @medial_axis.simplifier before the class")
     native = info.native
     return json.dumps(
         {
@@ -72,12 +72,11 @@ def prepare(cls: Any, shape: _medial.ShapeHandle, params: str, run: _medial.RunH
 
 
 def _values(known: tuple[Param, ...], given: dict[str, Any]) -> dict[str, Any]:
-    """The value of every parameter: as it was set, or the default, which decides the type."""
+    """The value of every parameter: as set, or the default, which decides the type."""
     names = [param.name for param in known]
     for key in given:
         if key not in names:
-            there = ", ".join(names) or "none"
-            raise ParameterError(f"unknown parameter `{key}`; there are: {there}")
+            raise ParameterError(f"unknown parameter `{key}` (expected one of: {', '.join(names) or 'none'})")
     return {param.name: _typed(param, given.get(param.name, param.default)) for param in known}
 
 
@@ -94,33 +93,33 @@ def _typed(param: Param, value: Any) -> Any:
         value = value if isinstance(value, str) else json.dumps(value)
         fits, needed = True, "a text"
     if not fits:
-        raise ParameterError(f"{param.name} = {value!r}: {needed} is needed")
+        raise ParameterError(f"{param.name} = {value!r}: expected {needed}")
     return type(default)(value)
 
 
-def at(instance: Any, kind: str, value: float) -> Answer:
+def at(instance: Any, kind: str, value: float) -> Output:
     """The result of an instance at a level."""
     levels = {
         "published": Level(),
         "spheres": Level(spheres=int(value)),
         "native": Level(native=value),
     }
-    answer = instance.at(levels[kind])
-    if isinstance(answer, MedialAxis):
-        answer = Simplified(answer)
-    if not isinstance(answer, Simplified):
+    result = instance.at(levels[kind])
+    if isinstance(result, MedialAxis):
+        result = Simplified(result)
+    if not isinstance(result, Simplified):
         name = type(instance).__qualname__
-        raise TypeError(f"{name}.at: a MedialAxis or Simplified is needed, not a {type(answer).__name__}")
-    axis = answer.axis
+        raise TypeError(f"{name}.at: expected a MedialAxis or Simplified, found a {type(result).__name__}")
+    axis = result.axis
     if not isinstance(axis, MedialAxis):
-        raise TypeError(f"Simplified.axis: a MedialAxis is needed, not a {type(axis).__name__}")
-    level = None if answer.native_level is None else float(answer.native_level)
-    warnings = [str(warning) for warning in answer.warnings]
-    return Answer(axis._axis, level, warnings)
+        raise TypeError(f"Simplified.axis: expected a MedialAxis, found a {type(axis).__name__}")
+    level = None if result.native_level is None else float(result.native_level)
+    warnings = [str(warning) for warning in result.warnings]
+    return Output(axis._axis, level, warnings)
 
 
-def tell(error: BaseException) -> str:
-    """An exception in a line: its type, its message, and where in the user's own file it was raised."""
+def error_text(error: BaseException) -> str:
+    """An exception in a line: its type, its message, and the line in the user's file that raised it."""
     here = os.path.dirname(os.path.abspath(__file__))
     frames = traceback.extract_tb(_traceback(error))
     own = [frame for frame in frames if not os.path.abspath(frame.filename).startswith(here)]
@@ -141,9 +140,9 @@ def load(path: str | os.PathLike[str]) -> list[type[Any]]:
     name = f"_medial_plugin_{stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise ParameterError(f"{path} is no Python file")
+        raise ParameterError(f"{path}: not a Python file")
     module = importlib.util.module_from_spec(spec)
-    # What it imports from its own folder is found, as when it is run.
+    # As if it was run: imports from its folder work.
     sys.path.insert(0, os.path.dirname(path))
     sys.modules[name] = module
     loading = path

@@ -27,30 +27,30 @@ _OPTIONS = ("spheres", "level", "max_error", "seed", "threads", "progress", "par
 
 @dataclass(frozen=True)
 class Run:
-    """How a result was made."""
+    """The run of a method that made a medial mesh."""
 
     method: str
     asked: str
-    """The level, in words."""
+    """The requested level as text."""
     params: Mapping[str, Any] = field(hash=False)
     native_level: float | None = None
-    """The method's own level that met the request, where it has one."""
+    """The native level that met the request, if the method has one."""
     seconds: Mapping[str, float] = field(default_factory=dict, hash=False)
-    """By stage: `substrate`, shared by all methods; `prepare` and `simplify`, the method's own; and their `total`."""
+    """By stage: `substrate`, shared by all methods; `prepare` and `simplify` of the method; and their `total`."""
     substrates: Mapping[str, float] = field(default_factory=dict, hash=False)
-    """Seconds of each substrate that the method used, whoever built it first."""
+    """Seconds of each substrate that the method used, also if another method built it."""
     warnings: tuple[str, ...] = ()
     max_error: Mapping[str, Any] | None = field(default=None, hash=False)
-    """What the search for an error bound found."""
+    """The result of the search for an error bound."""
     record: Mapping[str, Any] = field(default_factory=dict, repr=False, hash=False)
-    """All of it, as `simplify` in a line of `results.jsonl`."""
+    """The whole run, as `simplify` in a line of `results.jsonl`."""
 
 
 class MedialAxis:
     """A medial mesh: spheres, and edges and triangles between them, in the units of its surface.
 
-    Made by `Mesh.medial_axis`, `Mesh.read_axis`, `MedialAxis.read`, or of arrays. Sides of faces are added as edges, and
-    simplices sorted. Two medial meshes are equal if their arrays are, bit by bit, whatever their surfaces and runs. A
+    Made by `Mesh.medial_axis`, `Mesh.read_axis`, `MedialAxis.read`, or from arrays. Sides of faces are added as edges, and
+    simplices sorted. Two medial meshes are equal if their arrays are, bit by bit, independent of surfaces and runs. A
     medial mesh does not change; it can be pickled, copied, and be a key.
 
     Args:
@@ -58,7 +58,7 @@ class MedialAxis:
         radii: n radii.
         edges: m x 2 indices of spheres, from 0.
         faces: k x 3 indices of spheres.
-        mesh: The surface that it is of, in the same unit.
+        mesh: Its surface, in the same unit.
 
     Raises:
         InputError: The arrays are wrong.
@@ -72,11 +72,11 @@ class MedialAxis:
     _axis: _medial.Axis
     _png: bytes | None
     mesh: Mesh | None
-    """The surface that it is of, where that is known."""
+    """Its surface, if known."""
     run: Run | None
-    """How it was made, if by a method."""
+    """The run of the method that made it, if any."""
     remarks: tuple[str, ...]
-    """What was found and repaired in its file."""
+    """Defects and repairs of its file."""
 
     def __init__(
         self,
@@ -146,7 +146,7 @@ class MedialAxis:
             A medial mesh that can be simplified and evaluated.
 
         Raises:
-            InputError: `mesh` is no surface that bounds a solid.
+            InputError: `mesh` bounds no solid.
             ParameterError: `sampling` or `dual` is another word.
 
         Example:
@@ -154,7 +154,7 @@ class MedialAxis:
             <MedialAxis of box: 1 spheres, 0 edges, 0 faces>
         """
         if not isinstance(mesh, Mesh):
-            raise InputError(f"mesh: a Mesh is needed, not a {type(mesh).__name__}")
+            raise InputError(f"mesh: expected a Mesh, found a {type(mesh).__name__}")
         mesh._solid()
         made = self._axis.of(mesh._surface, str(sampling), str(dual), call(seed)[0])
         return MedialAxis._of(made, mesh, run=self.run, remarks=self.remarks)
@@ -226,15 +226,15 @@ class MedialAxis:
         params: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> MedialAxis:
-        """The simplification by a method. One of `spheres`, `level` and `max_error` is needed.
+        """The simplification by a method. Give one of `spheres`, `level` and `max_error`.
 
         Args:
             method: An id of `medial_axis.methods()`, or a class of your own.
             spheres: Number of spheres.
-            level: The method's own level, in its unit; or `published`, the setting of its paper.
-            max_error: As few spheres as keep the Hausdorff error within this fraction of the bounding-box diagonal.
+            level: The native level, in the unit of the method; or `published`, the setting of its paper.
+            max_error: Search the fewest spheres with at most this Hausdorff error, a fraction of the bounding-box diagonal.
             seed: Seed of every random choice.
-            threads: Threads of a pool of its own; by default all calls share one.
+            threads: Threads of a separate pool; by default all calls share one.
             progress: Called with a stage and its completed share.
             params: Parameters of the method, by name.
             more: The same as keywords: `k=1e-5`. `medial_axis.methods()` lists them with units and defaults.
@@ -245,7 +245,7 @@ class MedialAxis:
 
         Raises:
             ParameterError: The method, its level or a parameter is wrong or missing.
-            UnsupportedError: The method does not do this.
+            UnsupportedError: The method does not support this.
             FailedError: The method failed.
             InputError: This medial mesh has no surface.
 
@@ -257,7 +257,7 @@ class MedialAxis:
         from .method import id_of, known_params
 
         if not isinstance(method, (str, type)):
-            raise ParameterError(f"method: an id or a class is needed, not {method!r}")
+            raise ParameterError(f"method: expected an id or a class, found {method!r}")
         given = {**(params or {}), **more}
         id, known = id_of(method), known_params(method)
         unknown = [] if known is None else [str(key) for key in given if key not in known]
@@ -267,7 +267,7 @@ class MedialAxis:
         # Other mistakes are reported by the method itself.
         if known is not None and not unknown and spheres is level is max_error is None:
             raise ParameterError(
-                f"{id}: no level is given; give one of spheres=N, level=X (the method's own, or "
+                f"{id}: no level; give one of spheres=N, level=X (the native level, or "
                 '"published") and max_error=E (a fraction of the diagonal)'
             )
         try:
@@ -276,7 +276,7 @@ class MedialAxis:
             raise ParameterError(f"parameters {given!r}: {error}") from None
         is_published = isinstance(level, str) and level == "published"
         if is_published and not spheres is max_error is None:
-            raise ParameterError("give one of spheres, level and max_error")
+            raise ParameterError("more than one level; give one of spheres, level and max_error")
         axis, facts = self._axis.simplify(
             method,
             None if spheres is None else whole(spheres, "spheres", 0, 2**32 - 1),
@@ -285,8 +285,8 @@ class MedialAxis:
             text,
             call(seed, threads, progress),
         )
-        told: dict[str, Any] = json.loads(facts)
-        record = told["simplify"]
+        loaded: dict[str, Any] = json.loads(facts)
+        record = loaded["simplify"]
         notes = tuple(record["warnings"])
         missed = f"{len(axis.radii)} spheres instead of {spheres}"
         if record["status"] == "other_count" and not any(missed in note for note in notes):
@@ -295,13 +295,13 @@ class MedialAxis:
             warnings.warn(f"{id}: {note}", MedialWarning, stacklevel=2)
         run = Run(
             method=id,
-            asked=told["asked"],
+            asked=loaded["asked"],
             params=given,
             native_level=record["native_level"],
             seconds=record["seconds"],
             substrates=record["substrates"],
             warnings=notes,
-            max_error=told["max_error"],
+            max_error=loaded["max_error"],
             record=record,
         )
         return MedialAxis._of(axis, self.mesh, run=run)
@@ -319,11 +319,11 @@ class MedialAxis:
         """Every metric against a surface.
 
         Args:
-            mesh: The surface; by default its own.
-            certify: Enclose the Hausdorff error in an interval of this width, a fraction of the bounding-box diagonal.
-            samples: Surface samples next to the vertices; as many on the union.
+            mesh: The surface; by default that of the medial mesh.
+            certify: Certify the Hausdorff error by an interval of this width, a fraction of the bounding-box diagonal.
+            samples: Surface samples in addition to the vertices; as many on the union.
             seed: Seed of the samples.
-            threads: Threads of a pool of its own; by default all calls share one.
+            threads: Threads of a separate pool; by default all calls share one.
             progress: Called with a stage and its completed share.
 
         Returns:
@@ -340,7 +340,7 @@ class MedialAxis:
         """
         mesh = mesh if mesh is not None else self.mesh
         if not isinstance(mesh, Mesh):
-            raise InputError("evaluate: give the surface, a Mesh: this medial axis knows none")
+            raise InputError("evaluate: this medial axis has no surface; give the surface as mesh=")
         mesh._solid()
         text = self._axis.evaluate(
             mesh._surface,
@@ -361,7 +361,7 @@ class MedialAxis:
 
         Args:
             tolerance: Its largest distance from that boundary, a fraction of the bounding-box diagonal.
-            threads: Threads of a pool of its own; by default all calls share one.
+            threads: Threads of a separate pool; by default all calls share one.
             progress: Called with a stage and its completed share.
 
         Returns:
@@ -572,4 +572,4 @@ def _plain(value: Any) -> Any:
     """Numbers of numpy as those of Python."""
     if isinstance(value, np.generic):
         return value.item()
-    raise TypeError(f"{value!r} is no single value")
+    raise TypeError(f"expected a single value, found {value!r}")

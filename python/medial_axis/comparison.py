@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 _RESULTS = "results.csv"
 
-# How the command announces an item: its number, their number, mesh and method, and an estimate.
+# A line of progress of the command: number of the item, number of items, mesh and method, and an estimate.
 _BEGUN = re.compile(r"\[(\d+)/(\d+)\] (.*?)(?:, about .* left)?$")
 
 
@@ -36,11 +36,11 @@ class Report:
 
     folder: Path
     summary: str
-    """What the command printed."""
+    """The summary that the command printed."""
     complete: bool
     """Whether nothing failed. Results may still be off the count, unsupported or skipped."""
     reasons: tuple[str, ...] = ()
-    """Why results are missing, and other remarks of the command."""
+    """Reasons of missing results, and other remarks of the command."""
 
     @property
     def page(self) -> Path:
@@ -83,8 +83,8 @@ def compare(
 ) -> Report:
     """Runs methods on meshes, measures, and writes tables, plots and a page, as `medial compare` does.
 
-    It runs in processes of its own, with limits for each item. Results accumulate in the folder: the same call again runs
-    only missing items, also after Ctrl-C.
+    It runs in new processes, with limits for each item. Results accumulate in the folder: the same call again runs only
+    missing items, also after Ctrl-C.
 
     Args:
         meshes: Paths, names (`builtin:torus`) or `Mesh` objects, or one of them; by default three built-in shapes.
@@ -92,12 +92,12 @@ def compare(
         spheres: Counts.
         out: The folder.
         params: Parameters by method.
-        timeout: Seconds after which an item ends.
-        budget: Seconds on a mesh after which a method begins no further level.
-        memory: Megabytes above which an item ends.
-        jobs: Items at the same time; with several, seconds are in no table.
+        timeout: Seconds after which an item is stopped.
+        budget: Seconds on a mesh after which a method starts no further level.
+        memory: Megabytes above which an item is stopped.
+        jobs: Items at the same time; with several, tables omit seconds.
         threads: Threads; by default all processors.
-        keep: Results that stay on disk as `.ma`; `small`, the default, leaves out fine native levels.
+        keep: Results that stay on disk as `.ma`; `small`, the default, omits fine native levels.
         arguments: Further words of the command, such as `["--repeat", "3"]`.
         quiet: Print only reasons of missing results.
         progress: True shows one line that updates, on standard error or in a notebook; or a function, which is called with
@@ -107,9 +107,9 @@ def compare(
         The folder of results; `complete` if nothing failed.
 
     Raises:
-        InputError: A mesh is rejected, with the reasons of all that are.
+        InputError: Meshes are refused, with all reasons.
         ParameterError: A word of the command is wrong.
-        FailedError: There is no result at all, with the reasons.
+        FailedError: There is no result, with the reasons.
 
     Example:
         >>> from medial_axis import compare
@@ -119,7 +119,7 @@ def compare(
     """
     if _plugins.loading is not None:
         raise FailedError(
-            f"compare() was called while {_plugins.loading} was loaded for its classes: put the call under "
+            f"{_plugins.loading}: calls compare() when it is loaded for its classes; put the call under "
             'if __name__ == "__main__":'
         )
     folder = Path(path_text(out, "out"))
@@ -153,7 +153,7 @@ def load(folder: str | os.PathLike[str] = "medial-report") -> pd.DataFrame:
     """The results of a folder as a frame of pandas.
 
     Args:
-        folder: What `compare` wrote.
+        folder: The folder of `compare`.
 
     Returns:
         A row for each result, with the columns of `results.csv`.
@@ -170,14 +170,14 @@ def load(folder: str | os.PathLike[str] = "medial-report") -> pd.DataFrame:
     pandas = need("pandas", "pandas")
     path = Path(path_text(folder, "folder")) / _RESULTS
     if not path.is_file():
-        raise InputError(f"{path}: there are no results; `compare` or `medial compare` makes them")
+        raise InputError(f"{path}: no results; run compare or `medial compare`")
     # Its many columns are one block in a copy, so that others can be added.
     frame: pd.DataFrame = pandas.read_csv(path, low_memory=False).copy()
     return frame
 
 
 def _inputs(meshes: Any, folder: Path) -> list[str]:
-    """Words for meshes; those that are of no file are written into the folder."""
+    """Words for meshes; meshes without a file are written to the folder."""
     given = [meshes] if isinstance(meshes, (str, os.PathLike, Mesh)) else list(meshes)
     words = []
     for mesh in given:
@@ -188,7 +188,7 @@ def _inputs(meshes: Any, folder: Path) -> list[str]:
         else:
             path = folder / "inputs" / f"{mesh.name}.ply"
             if str(path) in words:
-                raise ParameterError(f"two meshes are called {mesh.name}; Mesh(..., name=...) tells them apart")
+                raise ParameterError(f"two meshes have the name {mesh.name}; rename one by Mesh(..., name=...)")
             path.parent.mkdir(parents=True, exist_ok=True)
             mesh.save(path)
             words.append(str(path))
@@ -211,10 +211,10 @@ def _word(value: Any) -> str:
 
 
 def _run(words: list[str], quiet: bool, progress: Line | Progress | None) -> tuple[int, str, str]:
-    """Runs the command: its exit code and what it printed. Ctrl-C ends it as it ends the command itself."""
-    # Its lines of progress are needed for that of the caller.
+    """Runs the command: its exit code and both outputs. Ctrl-C ends it like the command itself."""
+    # The callback needs its lines of progress.
     command = [*STARTED_BY, *words, *(["--quiet"] if quiet and progress is None else [])]
-    # Of a session of its own: a terminal would interrupt it once, and this function a second time.
+    # In a new session: otherwise a terminal would interrupt it once, and this function a second time.
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
@@ -225,7 +225,7 @@ def _run(words: list[str], quiet: bool, progress: Line | Progress | None) -> tup
     empty = threading.Thread(target=lambda out: printed.append(out.read()), args=(process.stdout,), daemon=True)
     empty.start()
     try:
-        # What the command says while it runs is shown by this thread, where a notebook shows it too.
+        # Its messages are shown by this thread, so that a notebook shows them, too.
         for line in process.stderr:
             errors.append(line)
             begun = _BEGUN.match(line)
@@ -268,7 +268,7 @@ class Line:
         left = _clock(spent / share - spent) if done else "?"
         bar = "\u2588" * int(10 * share)
         text = f"compare: {share:4.0%}|{bar:10}| {done}/{total} [{_clock(spent)}<{left}, {stage}]"
-        # What a longer line left is overwritten.
+        # Overwrites the rest of a longer line.
         sys.stderr.write("\r" + text.ljust(self._width))
         sys.stderr.flush()
         self._width = len(text)

@@ -1,4 +1,4 @@
-"""Exceptions. Their messages are the sentences that the command prints; each names what is wrong and what to do."""
+"""Exceptions. Their messages are those of the command: the input, the problem, and advice."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ class ParameterError(MedialError, ValueError):
 
 
 class UnsupportedError(MedialError, NotImplementedError):
-    """The method does not do this: an answer rather than a failure. Raise it in a class of your own, too."""
+    """The method does not support this. Not a failure; raise it in your class, too."""
 
 
 class FailedError(MedialError, RuntimeError):
-    """The method could not do it, and says why."""
+    """The method failed; the message has the reason."""
 
 
 class CancelledError(MedialError, RuntimeError):
-    """The run was told to stop."""
+    """The run was cancelled."""
 
 
 class InternalError(MedialError, RuntimeError):
-    """A fault of this package: please report it with the input."""
+    """A bug of this package: please report it with the input."""
 
 
 class MedialWarning(UserWarning):

@@ -1,4 +1,4 @@
-"""What was measured on a medial mesh."""
+"""Evaluations of medial meshes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from . import _medial
 
 _DIAGONAL = "fraction of the bounding-box diagonal"
 
-# A number with its unit, as `Evaluation.unit` tells it.
+# A number with its unit, for `Evaluation.unit`.
 _Length = Annotated[float, _DIAGONAL]
 _Degrees = Annotated["float | None", "degrees"]
 _OfTriangles = Annotated["float | None", "share of the triangles"]
@@ -141,30 +141,30 @@ class Evaluation:
             >>> Evaluation.from_json(json.dumps(found.record["evaluate"])) == found
             True
         """
-        told: dict[str, Any] = json.loads(text)
+        values: dict[str, Any] = json.loads(text)
         status = "external" if simplify is None else simplify["status"]
-        sizes = {name: told["counts"][name] for name in ("spheres", "edges", "faces")}
-        asked = simplify or {"method": "", "level": "published", "status": status, **sizes}
-        record = {"mesh": mesh, "status": status, "simplify": asked, "evaluate": json.loads(text)}
-        certified = told.get("certified")
+        sizes = {name: values["counts"][name] for name in ("spheres", "edges", "faces")}
+        run = simplify or {"method": "", "level": "published", "status": status, **sizes}
+        record = {"mesh": mesh, "status": status, "simplify": run, "evaluate": json.loads(text)}
+        certified = values.get("certified")
         if certified is not None:
             witness = certified.pop("witness")
             certified = Certificate(**certified, point=_triple(witness["point"]), on=witness["on"])
-        spikes = {**told["spikes"], "by_ratio": tuple(told["spikes"]["by_ratio"])}
-        expected = told.get("expected_betti")
-        told.update(
+        spikes = {**values["spikes"], "by_ratio": tuple(values["spikes"]["by_ratio"])}
+        expected = values.get("expected_betti")
+        values.update(
             certified=certified,
-            axis=told.get("axis"),
-            quality=TriangleQuality(**told["quality"]),
+            axis=values.get("axis"),
+            quality=TriangleQuality(**values["quality"]),
             spikes=Spikes(**spikes),
-            counts=Counts(**told["counts"]),
-            betti=tuple(told["betti"]),
+            counts=Counts(**values["counts"]),
+            betti=tuple(values["betti"]),
             expected_betti=None if expected is None else tuple(expected),
-            warnings=tuple(told["warnings"]),
+            warnings=tuple(values["warnings"]),
             record=record,
         )
-        # The command says its version beside the numbers.
-        return cls(**{name: told[name] for name in (f.name for f in dataclasses.fields(cls))})
+        # Without the version, which the command adds.
+        return cls(**{name: values[name] for name in (f.name for f in dataclasses.fields(cls))})
 
     @classmethod
     def unit(cls, name: str) -> str | None:
@@ -174,7 +174,7 @@ class Evaluation:
             name: The field.
 
         Returns:
-            The unit; None for counts and what is no number.
+            The unit; None for counts and fields that are not numbers.
 
         Raises:
             KeyError: There is no such field.
@@ -197,7 +197,7 @@ class Evaluation:
             The length.
 
         Raises:
-            ValueError: The field is no length.
+            ValueError: The field is not a length.
 
         Example:
             >>> from medial_axis import Mesh
@@ -207,7 +207,7 @@ class Evaluation:
         """
         value = getattr(self, name)
         if self.unit(name) != _DIAGONAL or value is None:
-            raise ValueError(f"{name} is no fraction of the diagonal, but {self.unit(name) or value!r}")
+            raise ValueError(f"{name}: expected a fraction of the diagonal, found {self.unit(name) or value!r}")
         return float(value) * self.diagonal
 
     def row(self) -> dict[str, Any]:
@@ -226,7 +226,7 @@ class Evaluation:
             >>> pandas.DataFrame(rows)[["spheres", "hausdorff"]]  # doctest: +SKIP
         """
         [row] = csv.DictReader(io.StringIO(_medial.results_row(json.dumps(self.record))))
-        # Nothing is known of the machine, and of the request of a medial mesh from elsewhere.
+        # The machine, and the request of an external medial mesh, are unknown.
         unknown = {"cores", "memory", "seeds"}
         if self.record["simplify"]["method"] == "":
             unknown |= {"level", "asked", "params", "seed"}

@@ -27,7 +27,7 @@ class Mesh:
         vertices: n x 3 positions, in any unit; or a mesh of trimesh, Open3D or PyVista, or a pair of arrays.
         faces: m x 3 indices of vertices, from 0.
         name: Name in tables.
-        threads: Threads of a pool of its own; by default all calls share one.
+        threads: Threads of a separate pool; by default all calls share one.
         progress: Called with a stage and its completed share.
 
     Raises:
@@ -78,7 +78,7 @@ class Mesh:
 
         Args:
             path: An OFF, OBJ, PLY or STL file; `builtin:ID`, a solid with a known axis; or `dataset:NAME`.
-            threads: Threads of a pool of its own; by default all calls share one.
+            threads: Threads of a separate pool; by default all calls share one.
             progress: Called with a stage and its completed share.
 
         Returns:
@@ -109,7 +109,7 @@ class Mesh:
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> Mesh:
-        """A surface that bounds a solid, from one that need not: as `medial repair`.
+        """Repairs a surface until it bounds a solid, like `medial repair`.
 
         Args:
             vertices: A file; or n x 3 positions, or a mesh of another package, as for `Mesh`.
@@ -118,14 +118,14 @@ class Mesh:
             separate: Move parts that touch in a vertex apart there, by a thousandth of the size of its faces.
             components: Keep all parts, or the largest one.
             name: Name in tables; by default the stem of the file.
-            threads: Threads of a pool of its own; by default all calls share one.
+            threads: Threads of a separate pool; by default all calls share one.
             progress: Called with a stage and its completed share.
 
         Returns:
             The surface; `report()["repairs"]` lists the repairs.
 
         Raises:
-            InputError: The surface bounds no solid even so.
+            InputError: The surface still bounds no solid.
             ParameterError: `components` is another word.
 
         Example:
@@ -135,7 +135,7 @@ class Mesh:
             (4, 'filled_hole')
         """
         if components not in ("all", "largest"):
-            raise ParameterError(f"components: all or largest is needed, not {components!r}")
+            raise ParameterError(f"components: expected all or largest, found {components!r}")
         path, off = "mesh", None
         if faces is None and isinstance(vertices, (str, os.PathLike)):
             path = path_text(vertices)
@@ -227,7 +227,7 @@ class Mesh:
             sampling: `vertices`, `auto` (adds samples where the axis fails), `uniform:COUNT` or `blue:COUNT`.
             dual: How Voronoi polygons are triangulated: `fan` or `delaunay`.
             seed: Seed of random samples.
-            threads: Threads of a pool of its own; by default all calls share one.
+            threads: Threads of a separate pool; by default all calls share one.
             progress: Called with a stage and its completed share.
 
         Returns:
@@ -265,9 +265,9 @@ class Mesh:
             fit: `none`: the file has the unit of the surface. `similarity` finds scale and translation; `auto` does if the
                 spheres do not fit otherwise.
             radii: `surface` gives spheres without radii their distance to the surface.
-            lenient: Take lines that the header does not announce.
-            block: Which of several meshes in one file, from 1.
-            threads: Threads of a pool of its own; by default all calls share one.
+            lenient: Read all lines if the header states a different number.
+            block: Number of the mesh in a file with several, from 1.
+            threads: Threads of a separate pool; by default all calls share one.
             progress: Called with a stage and its completed share.
 
         Returns:
@@ -302,13 +302,13 @@ class Mesh:
 
         Args:
             points: n x 3 positions.
-            threads: Threads of a pool of its own; by default all calls share one.
+            threads: Threads of a separate pool; by default all calls share one.
 
         Returns:
             Closest points (n x 3), distances (n, in the unit of the mesh) and faces (n).
 
         Raises:
-            InputError: `points` is no n x 3 array of finite numbers.
+            InputError: `points` is not an n x 3 array of finite numbers.
 
         Example:
             >>> closest, distances, faces = Mesh.read("builtin:box").closest_points([[0, 0, 9]])
@@ -322,13 +322,13 @@ class Mesh:
 
         Args:
             points: n x 3 positions.
-            threads: Threads of a pool of its own; by default all calls share one.
+            threads: Threads of a separate pool; by default all calls share one.
 
         Returns:
             n distances, in the unit of the mesh.
 
         Raises:
-            InputError: `points` is no n x 3 array of finite numbers, or the surface bounds no solid.
+            InputError: `points` is not an n x 3 array of finite numbers, or the surface bounds no solid.
 
         Example:
             >>> Mesh.read("builtin:box").signed_distance([[0, 0, 0], [0, 0, 9]]).tolist()
@@ -500,6 +500,6 @@ def _foreign(value: Any) -> tuple[Any, Any]:
     if hasattr(value, "points") and hasattr(value, "regular_faces"):  # PyVista
         return value.points, value.triangulate().regular_faces
     raise InputError(
-        f"a {type(value).__name__} is no mesh: give vertices and faces, or a mesh of trimesh, Open3D or PyVista; "
-        "Mesh.read takes a file"
+        f"not a mesh (found a {type(value).__name__}); give vertices and faces, a mesh of trimesh, Open3D or PyVista, "
+        "or a file to Mesh.read"
     )

@@ -1,4 +1,4 @@
-"""Methods: those that there are, and classes of one's own."""
+"""Methods: those of the program, and Python classes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _Class = TypeVar("_Class", bound=type[Any])
 
 @dataclass(frozen=True)
 class NativeLevel:
-    """The scalar that a method is controlled by in its paper."""
+    """The scalar that controls a method in its paper."""
 
     name: str
     unit: str
@@ -38,7 +38,7 @@ class Param:
 
 @dataclass(frozen=True)
 class MethodInfo:
-    """What a method says of itself."""
+    """The description of a method."""
 
     id: str
     """Lower-case letters, digits and hyphens."""
@@ -50,7 +50,7 @@ class MethodInfo:
     sweep: tuple[float, ...] = ()
     """Native levels of a default comparison, from fine to coarse."""
     published: str | None = None
-    """What the level without a number means, where there is one."""
+    """Meaning of the published level; None without one."""
     on_request: bool = False
     """Whether it runs only when named, because it takes long."""
     incremental: bool = False
@@ -72,19 +72,19 @@ class Level:
 
 @dataclass(frozen=True)
 class Simplified:
-    """A result with more to say than its medial mesh."""
+    """A medial mesh with diagnostics."""
 
     axis: MedialAxis
     native_level: float | None = None
-    """The method's own level that met a number of spheres."""
+    """The native level that met a number of spheres."""
     warnings: tuple[str, ...] = field(default_factory=tuple)
 
 
 class Shape:
     """A surface as a method sees it: normalised to a bounding-box diagonal of 1.
 
-    Its arrays are substrates: built once for all methods of a comparison and charged to each that uses them. Do not
-    rebuild them.
+    Its arrays are substrates: built once for all methods of a comparison, and counted in the seconds of each method that
+    uses them. Do not rebuild them.
     """
 
     def __init__(self, handle: _medial.ShapeHandle) -> None:
@@ -164,7 +164,7 @@ class Shape:
             n truth values.
 
         Raises:
-            InputError: `points` is no n x 3 array of finite numbers.
+            InputError: `points` is not an n x 3 array of finite numbers.
 
         Example:
             points[shape.inside(points)]
@@ -181,7 +181,7 @@ class Shape:
             n distances, in diagonals, without a sign.
 
         Raises:
-            InputError: `points` is no n x 3 array of finite numbers.
+            InputError: `points` is not an n x 3 array of finite numbers.
 
         Example:
             radii = shape.distances(centres)
@@ -190,7 +190,7 @@ class Shape:
 
 
 class RunContext:
-    """What surrounds a run."""
+    """The context of a run."""
 
     def __init__(self, handle: _medial.RunHandle) -> None:
         self._handle = handle
@@ -202,11 +202,11 @@ class RunContext:
 
     @property
     def threads(self) -> int:
-        """How many threads to use."""
+        """Number of threads to use."""
         return self._handle.threads
 
     def step(self, done: int, total: int) -> None:
-        """Reports progress. Call it now and then.
+        """Reports progress. Call it often.
 
         Args:
             done: Completed steps.
@@ -228,7 +228,7 @@ _ID = re.compile(r"[a-z0-9-]+")
 def simplifier(cls: _Class) -> _Class:
     """Makes a class a method, for `MedialAxis.simplify`, `compare`, and `medial compare --plugins FILE.py`.
 
-    All lengths are fractions of the bounding-box diagonal, those of results too.
+    All lengths are fractions of the bounding-box diagonal, also in results.
 
     Args:
         cls: A class with `info`, `prepare` and `at`.
@@ -250,7 +250,7 @@ def simplifier(cls: _Class) -> _Class:
 
             def at(self, level):                     # for each Level, from fine to coarse
                 if level.spheres is None:
-                    raise medial_axis.UnsupportedError("ask for a number of spheres")
+                    raise medial_axis.UnsupportedError("give a number of spheres")
                 keep = np.zeros(len(self.axis), bool)
                 keep[self.order[: level.spheres]] = True
                 return self.axis.induced(keep)       # a MedialAxis, or Simplified
@@ -258,12 +258,12 @@ def simplifier(cls: _Class) -> _Class:
     info = getattr(cls, "info", None)
     name = getattr(cls, "__qualname__", repr(cls))
     if not isinstance(cls, type):
-        raise ParameterError(f"@simplifier stands before a class, not before {cls!r}")
+        raise ParameterError(f"@simplifier: expected a class, found {cls!r}")
     if not isinstance(info, MethodInfo):
-        raise ParameterError(f"{name}.info: a MethodInfo is needed, not {info!r}")
+        raise ParameterError(f"{name}.info: expected a MethodInfo, found {info!r}")
     if not _ID.fullmatch(info.id):
         raise ParameterError(
-            f"{name}.info.id: {info.id!r} is not made of lower-case letters, digits and hyphens"
+            f"{name}.info.id: invalid (found {info.id!r}, expected lower-case letters, digits and hyphens)"
         )
     for method in ("prepare", "at"):
         if not callable(getattr(cls, method, None)):
@@ -298,7 +298,7 @@ def _built_in() -> dict[str, list[str]]:
 
 
 def known_params(method: str | type[Any]) -> list[str] | None:
-    """Names of the parameters of a method; None for what is none."""
+    """Names of the parameters of a method; None for other objects."""
     if isinstance(method, str):
         return _built_in().get(method)
     info = getattr(method, "info", None)
@@ -306,7 +306,7 @@ def known_params(method: str | type[Any]) -> list[str] | None:
 
 
 def id_of(method: str | type[Any]) -> str:
-    """The id of a method that is named by it, or is a class."""
+    """The id of a method, given as such or as a class."""
     if isinstance(method, str):
         return method
     info = getattr(method, "info", None)
@@ -319,7 +319,7 @@ def file_of(cls: type[Any]) -> str:
     path = getattr(module, "__file__", None)
     if path is None:
         raise ParameterError(
-            f"{cls.__qualname__} stands in no file, so no worker can load it: put it into a .py file and import it "
+            f"{cls.__qualname__}: not in a file that workers can load; put it into a .py file and import it "
             "(in a notebook: a cell that begins with %%writefile my_method.py)"
         )
     return str(path)

@@ -37,8 +37,8 @@ class Picture:
     """From the shape to the eye."""
     up: tuple[float, float, float]
     errors: tuple[Mapping[str, float | None], ...] = field(hash=False)
-    """For each reconstruction that is drawn: `max` and `mean` of the drawn errors, and `hausdorff` as `evaluate` has it;
-    fractions of the bounding-box diagonal."""
+    """For each drawn reconstruction: `max` and `mean` of the drawn errors, and `hausdorff` as in `evaluate`; fractions of
+    the bounding-box diagonal."""
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the PNG file.
@@ -81,19 +81,19 @@ def render(
     Args:
         mesh: The surface; or a medial mesh, which is drawn in its surface.
         axes: Medial meshes of it. Several give a strip: a panel for each, from the same camera.
-        show: What is drawn. `axis` unless there is none, then `surface`. `error` is the reconstruction, coloured by its
-            distance to the surface.
-        color: What a medial mesh is coloured by: its radii, or one colour for sheets and one for curves.
+        show: Content of the picture; by default `axis`, or `surface` without a medial mesh. `error` is the reconstruction,
+            coloured by its distance to the surface.
+        color: Colours of a medial mesh: by `radius`, or `plain` with one colour for sheets and one for curves.
         camera: `front`, `back`, `left`, `right`, `top`, `bottom`, `iso`; azimuth and elevation in degrees; or the direction
             from the shape to the eye. By default the direction that shows most of the shape.
         up: `x`, `y`, `z`, `-x`, `-y`, `-z`, or a direction.
-        zoom: 1: the shape fills the picture; 2: twice as large.
-        size: Width and height in pixels, of a strip's panel.
+        zoom: Factor of enlargement; 1 fills the picture.
+        size: Width and height of each panel, in pixels.
         background: `white`, `black`, `transparent` or `#rrggbb`.
         max_error: End of the scale of errors, a fraction of the diagonal.
         tolerance: Largest distance of a drawn reconstruction from the boundary of the union, a fraction of the diagonal.
         names: Captions of a strip, one for each medial mesh; by default the method.
-        threads: Threads of a pool of its own; by default all calls share one.
+        threads: Threads of a separate pool; by default all calls share one.
         progress: Called with a stage and its completed share.
 
     Returns:
@@ -116,14 +116,14 @@ def render(
     if isinstance(mesh, MedialAxis):
         drawn.insert(0, mesh)
         if mesh.mesh is None:
-            raise InputError("render: this medial axis has no surface; read it with Mesh.read_axis")
+            raise InputError("render: this medial axis has no surface; read it by Mesh.read_axis")
         mesh = mesh.mesh
     if not isinstance(mesh, Mesh) or not all(isinstance(axis, MedialAxis) for axis in drawn):
-        raise InputError("render: give a Mesh and MedialAxis objects")
+        raise InputError("render: expected a Mesh and MedialAxis objects")
     mesh._solid()
     captions = [_caption(axis) for axis in drawn] if names is None else [str(name) for name in names]
     if len(captions) != len(drawn):
-        raise ParameterError(f"names: {len(captions)} for {len(drawn)} medial meshes")
+        raise ParameterError(f"names: wrong number (found {len(captions)}, expected {len(drawn)})")
     options = {
         "show": show,
         "color": color,
@@ -138,10 +138,9 @@ def render(
     words = [f"--{key}={_word(value)}" for key, value in options.items() if value is not None]
     layers = [(name, axis._axis) for name, axis in zip(captions, drawn)]
     png, facts = _medial.render(mesh._surface, layers, words, call(0, threads, progress))
-    told = json.loads(facts)
-    return Picture(
-        png, told["width"], told["height"], tuple(told["direction"]), tuple(told["up"]), tuple(told["errors"])
-    )
+    drawn_as = json.loads(facts)
+    direction, up, errors = (tuple(drawn_as[key]) for key in ("direction", "up", "errors"))
+    return Picture(png, drawn_as["width"], drawn_as["height"], direction, up, errors)
 
 
 def _word(value: Any) -> str:
@@ -155,7 +154,7 @@ def _caption(axis: MedialAxis) -> str:
 def plot(what: Mesh | MedialAxis, backend: Backend | None, screenshot: str | os.PathLike[str] | None) -> Any:
     """A window, or a cell of a notebook, of PyVista; else a `Picture`."""
     if backend not in (None, "pyvista", "png"):
-        raise ParameterError(f"backend: pyvista or png is needed, not {backend!r}")
+        raise ParameterError(f"backend: expected pyvista or png, found {backend!r}")
     if backend == "png" or (backend is None and importlib.util.find_spec("pyvista") is None):
         picture = render(what)
         if screenshot is not None:

@@ -34,7 +34,7 @@ def triangulate(
     Args:
         points: n x 3 positions. A contiguous array of float64 is read in place: it must not change meanwhile.
         weights: n squared radii.
-        threads: Threads of a pool of its own; by default all calls share one.
+        threads: Threads of a separate pool; by default all calls share one.
         progress: Called with a stage and its completed share.
 
     Returns:
@@ -51,7 +51,7 @@ def triangulate(
     sites = floats(points, "points")
     heights = None if weights is None else floats(weights, "weights", None)
     if heights is not None and len(heights) != len(sites):
-        raise InputError(f"weights: there are {len(heights)} for {len(sites)} points")
+        raise InputError(f"weights: wrong number (found {len(heights)}, expected {len(sites)})")
     cells, hidden, repeated = _medial.triangulate(sites, heights, call(0, threads, progress))
     return Triangulation(cells, hidden[:, 0], repeated)
 
@@ -64,13 +64,13 @@ def closest_points(
     Args:
         mesh: The surface.
         points: n x 3 positions.
-        threads: Threads of a pool of its own; by default all calls share one.
+        threads: Threads of a separate pool; by default all calls share one.
 
     Returns:
         Closest points (n x 3), distances (n, in the unit of the mesh) and faces (n).
 
     Raises:
-        InputError: `mesh` is no Mesh, or `points` no n x 3 array of finite numbers.
+        InputError: `mesh` is not a Mesh, or `points` not an n x 3 array of finite numbers.
 
     Example:
         >>> from medial_axis import Mesh, closest_points
@@ -87,13 +87,13 @@ def signed_distance(mesh: Mesh, points: Any, *, threads: int | None = None) -> F
     Args:
         mesh: The surface.
         points: n x 3 positions.
-        threads: Threads of a pool of its own; by default all calls share one.
+        threads: Threads of a separate pool; by default all calls share one.
 
     Returns:
         n distances, in the unit of the mesh.
 
     Raises:
-        InputError: `mesh` is no Mesh that bounds a solid, or `points` no n x 3 array of finite numbers.
+        InputError: `mesh` is not a Mesh that bounds a solid, or `points` not an n x 3 array of finite numbers.
 
     Example:
         >>> (signed_distance(Mesh.read("builtin:box"), [[0, 0, 0], [0, 0, 9]]) > 0).tolist()
@@ -112,18 +112,18 @@ def betti(axis: MedialAxis) -> tuple[int, int, int]:
         The Betti numbers b0, b1 and b2.
 
     Raises:
-        InputError: `axis` is no MedialAxis.
+        InputError: `axis` is not a MedialAxis.
 
     Example:
         >>> betti(Mesh.read("builtin:torus").medial_axis())
         (1, 1, 0)
     """
     if not isinstance(axis, MedialAxis):
-        raise InputError(f"betti: a MedialAxis is needed, not a {type(axis).__name__}")
+        raise InputError(f"betti: expected a MedialAxis, found a {type(axis).__name__}")
     return axis.betti
 
 
 def _mesh(mesh: Mesh) -> Mesh:
     if not isinstance(mesh, Mesh):
-        raise InputError(f"mesh: a Mesh is needed, not a {type(mesh).__name__}")
+        raise InputError(f"mesh: expected a Mesh, found a {type(mesh).__name__}")
     return mesh

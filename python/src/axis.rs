@@ -27,7 +27,7 @@ use crate::calls::{
 use crate::method::Method;
 use crate::surface::{Surface, shape_options};
 
-/// A medial mesh in input units, and the shape that it is of, where that is known.
+/// A medial mesh in input units, with its shape if that is known.
 #[pyclass(frozen, module = "medial_axis._medial")]
 pub struct Axis {
     /// In input units.
@@ -65,10 +65,10 @@ impl Axis {
         Self::new(in_input_units(mesh, shape.normalisation()), Some(shape))
     }
 
-    /// What a method starts from: the shape, with this mesh as the initial one unless it is.
+    /// The start of a method: the shape, with this mesh as the initial one.
     fn start(&self) -> Result<Shape, Failure> {
         let shape = self.shape.as_ref().ok_or_else(|| {
-            Failure::input("this medial axis knows no surface; read it with Mesh.read_axis, or give it one by axis.of(mesh)")
+            Failure::input("this medial axis has no surface; read it by Mesh.read_axis, or set one by axis.of(mesh)")
         })?;
         let view = shape.view();
         Ok(if self.is_initial { view } else { view.with_initial(&self.mesh) })
@@ -91,10 +91,10 @@ fn level(
 ) -> Result<Target, Failure> {
     let given = [spheres.is_some(), native.is_some(), bound.is_some()];
     if given.iter().filter(|is_given| **is_given).count() > 1 {
-        return Err(Failure::parameter("give one of spheres, level and max_error"));
+        return Err(Failure::parameter("several levels; give one of spheres, level and max_error"));
     }
     if let Some(bound) = bound.filter(|bound| !(*bound > 0.0 && *bound < 1.0)) {
-        let message = format!("max_error = {bound}: a fraction of the diagonal, between 0 and 1");
+        let message = format!("max_error = {bound}: expected a fraction between 0 and 1");
         return Err(Failure::parameter(message));
     }
     let of_count = spheres.map(Target::Spheres);
@@ -127,7 +127,7 @@ impl Axis {
         Ok(Self::new(mesh, None))
     }
 
-    /// A file: the mesh, and what is to be said of it.
+    /// The mesh in a file, and remarks on it.
     #[staticmethod]
     fn read(path: &str) -> PyResult<(Self, Vec<String>)> {
         let (mesh, remarks) = complex::read(Path::new(path)).map_err(Failure::from)?.with_remarks();
@@ -141,8 +141,8 @@ impl Axis {
         Ok(Self { mesh, ..Self::new(MedialMesh::default(), Some(shape)) })
     }
 
-    /// What arrays and surface do not say, for a copy: the samples that spheres touch (s x 3, and n x 4 indices), the
-    /// sampling and the dual of the shape, and whether it is the initial medial mesh.
+    /// The further state, for a copy: the contact samples of the spheres (s x 3, and n x 4 indices), the sampling and the
+    /// dual of the shape, and whether it is the initial medial mesh.
     fn state<'py>(&self, py: Python<'py>) -> PyResult<State<'py>> {
         let contacts = match &self.mesh.contacts {
             None => None,
@@ -211,11 +211,11 @@ impl Axis {
         self.faces.get(py, || of_rows(py, self.mesh.faces.iter().copied()))
     }
 
-    /// The spheres that are kept, with the edges and faces between them, and what the spheres touch.
+    /// The selected spheres with the edges and faces between them and their contacts.
     fn induced(&self, keep: Vec<bool>) -> PyResult<Self> {
         let (given, count) = (keep.len(), self.mesh.spheres.len());
         if given != count {
-            let message = format!("{given} truth values for {count} spheres");
+            let message = format!("keep: wrong length (found {given}, expected {count})");
             return Err(Failure::input(message).into());
         }
         Ok(Self::new(self.mesh.induced(&keep), self.shape.clone()))
@@ -238,14 +238,14 @@ impl Axis {
             Some("stability") => Some(SphereValues::stability(&self.mesh, 1.0)),
             Some("radius") => None,
             Some(other) => {
-                let message = format!("color = {other:?}: radius or stability");
+                let message = format!("color = {other:?}: expected radius or stability");
                 return Err(Failure::parameter(message).into());
             }
         };
         Ok(complex::write_with(path, &self.mesh, &Look { values, balls }).map_err(Failure::from)?)
     }
 
-    /// A simplification by a method, at a level; with it the facts of the run, as JSON.
+    /// A simplification by a method, at a level, and the facts of the run as JSON.
     #[pyo3(signature = (method, spheres, native, bound, params, call))]
     #[allow(clippy::too_many_arguments)]
     fn simplify(
@@ -306,7 +306,7 @@ impl Axis {
         })
     }
 
-    /// The boundary of the union of spheres, cones and slabs: whether it bounds a solid, else why not.
+    /// The boundary of the union of spheres, cones and slabs, and the reason if it bounds no solid.
     fn reconstruct(
         &self,
         py: Python<'_>,
@@ -322,13 +322,12 @@ impl Axis {
             let (low, high) = union.bounding_box();
             let corners = TriMesh { vertices: vec![low, high], faces: vec![] };
             let of_balls = Normalisation::of(&corners).map(|units| units.diagonal);
-            let diagonal = diagonal.or(of_balls).ok_or_else(|| {
-                Failure::input("the spheres have no extent, or one that is not finite")
-            })?;
+            let extent = "the extent of the spheres is zero or not finite";
+            let diagonal = diagonal.or(of_balls).ok_or_else(|| Failure::input(extent))?;
             let made = fitting_surface(&mesh, &union, diagonal, tolerance)?.made.mesh;
             let (report, problem) = match surface::validate(&made) {
                 Ok(report) => (report, None),
-                // It can be looked at and written all the same.
+                // It can still be viewed and written.
                 Err(error) => (SurfaceReport::default(), Some(error.to_string())),
             };
             Ok((Surface::new(name, Loaded { mesh: made, report }, None), problem))
@@ -336,7 +335,7 @@ impl Axis {
     }
 }
 
-/// A method on what it starts from.
+/// A method with its parameters and its start.
 struct Run {
     method: Method,
     params: Params,
@@ -344,7 +343,7 @@ struct Run {
 }
 
 impl Run {
-    /// The result at a level, and what is to be known of it.
+    /// The result at a level, with its diagnostics.
     fn at(
         &self,
         target: Target,
@@ -370,7 +369,7 @@ impl Run {
             &Budget::from_now(None),
             |_| {},
         );
-        let run = runs.pop().expect("one level was asked");
+        let run = runs.pop().expect("one level, one run");
         let simplified = run.outcome.map_err(Failure::of_fault)?;
         let fault = count_fault(target, &simplified);
         let mut record = Simplify {
@@ -395,7 +394,7 @@ impl Run {
         let measure = |mesh: &MedialMesh| {
             judge.distances(mesh).map(|found| found.hausdorff).map_err(|error| error.to_string())
         };
-        // Between two levels is where a search can be ended.
+        // A search can be cancelled between two levels.
         let trying = |_: Level| {
             let _ = context.step(0, usize::MAX);
         };

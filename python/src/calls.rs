@@ -1,9 +1,9 @@
 //! Calls from Python: long calls, numpy arrays, exceptions.
 //!
-//! Long work runs in a thread of its own without the interpreter's lock. The calling thread waits for it and checks
-//! every [`PATIENCE`] for Ctrl-C and progress, so that both arrive during steps that know nothing of them. An
-//! interrupted call ends at once. The work is told to stop and ends at its next step; until then it continues in the
-//! background, and its result is dropped.
+//! Long work runs in a new thread without the interpreter's lock. The calling thread waits for it and checks every
+//! [`PATIENCE`] for Ctrl-C and progress, so that both arrive during steps without support for them. An interrupted call
+//! returns at once. The work gets the cancel flag and ends at its next step; until then it continues in the background,
+//! and its result is dropped.
 //!
 //! `medial_axis/_arguments.py` has checked kind and shape of arrays and made them contiguous; here they are borrowed. An
 //! array that a thread reads stays alive as long as that thread ([`Held`]).
@@ -31,16 +31,16 @@ use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyRea
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
-/// How long Ctrl-C and progress may wait.
+/// Longest delay of Ctrl-C and progress.
 const PATIENCE: Duration = Duration::from_millis(40);
 
-/// As that of the main thread of a program: recursion is never deep, but inputs are anything.
+/// As in the main thread of a program.
 const STACK_BYTES: usize = 8 << 20;
 
-/// More threads than this serve nobody.
+/// More threads than this are rejected.
 const MOST_THREADS: usize = 1024;
 
-/// What the work tells the thread that waits.
+/// The progress of the work, for the waiting thread.
 #[derive(Clone, Default)]
 pub struct Monitor {
     now: Arc<Mutex<Now>>,
@@ -54,7 +54,7 @@ struct Now {
 }
 
 impl Monitor {
-    /// Names what is being done from now on.
+    /// Sets the current stage.
     pub fn at(&self, stage: &'static str) {
         *self.locked() = Now { stage, steps: None, is_new: true };
     }
@@ -64,13 +64,13 @@ impl Monitor {
         (now.steps, now.is_new) = (Some(steps), true);
     }
 
-    /// The stage and the share of it that is done, if there is news.
+    /// The stage and its finished share, if either has changed.
     fn news(&self) -> Option<(&'static str, Option<f64>)> {
         let mut now = self.locked();
         if !std::mem::take(&mut now.is_new) {
             return None;
         }
-        // Some stages do not know how many steps there will be.
+        // Some stages have no known number of steps.
         let known = now.steps.filter(|steps| steps.total > 0 && steps.total < usize::MAX);
         Some((now.stage, known.map(|steps| (steps.done as f64 / steps.total as f64).min(1.0))))
     }
@@ -80,13 +80,13 @@ impl Monitor {
     }
 }
 
-/// How a long call is made: of the tuple that `medial_axis/_arguments.py` has checked.
+/// The arguments of a long call, from the tuple that `medial_axis/_arguments.py` has checked.
 pub struct Call {
     /// Seed of every random choice.
     pub seed: u64,
-    /// Threads of a pool of its own; all processors together with other calls unless given.
+    /// Threads of a separate pool; `None` for the pool that all calls share.
     pub threads: Option<usize>,
-    /// Called with a stage and the share of it that is done.
+    /// Called with a stage and its finished share.
     pub progress: Option<Py<PyAny>>,
 }
 
@@ -99,10 +99,10 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Call {
     }
 }
 
-/// Does some work; see the head of this file.
+/// Runs `work` in a new thread; see the head of this file.
 ///
 /// # Errors
-/// Those of the work; what a progress function raises; `KeyboardInterrupt`.
+/// Errors of the work, exceptions of a progress function, and `KeyboardInterrupt`.
 pub fn long<T: Send + 'static>(
     py: Python<'_>,
     call: &Call,
@@ -110,24 +110,25 @@ pub fn long<T: Send + 'static>(
 ) -> PyResult<T> {
     let pool = call.threads.map(pool).transpose()?;
     let monitor = Monitor::default();
-    let (told, steps) = (monitor.clone(), monitor.clone());
+    let (stages, steps) = (monitor.clone(), monitor.clone());
     let run = RunContext::with_seed(call.seed).on_progress(move |progress| steps.steps(progress));
     let cancel = run.cancel_flag();
     let (sender, mut receiver) = mpsc::sync_channel(1);
     let all = move || {
-        let guarded = || catch_unwind(AssertUnwindSafe(|| work(&run, &told)));
+        let guarded = || catch_unwind(AssertUnwindSafe(|| work(&run, &stages)));
         let outcome = match pool {
             Some(pool) => pool.install(guarded),
             None => guarded(),
         };
-        // Nobody listens after an interrupt.
+        // Fails after an interrupt.
         let _ = sender.send(outcome.unwrap_or_else(|panic| Err(of_panic(panic.as_ref()))));
     };
-    thread::Builder::new().name("medial".to_owned()).stack_size(STACK_BYTES).spawn(all).map_err(
-        |error| Failure::new(Kind::Failed, format!("no thread can be started: {error}")),
-    )?;
-    // Whatever ends this call early ends the work.
-    let given_up = |error: PyErr| {
+    let builder = thread::Builder::new().name("medial".to_owned()).stack_size(STACK_BYTES);
+    let started = builder.spawn(all);
+    started
+        .map_err(|error| Failure::new(Kind::Failed, format!("cannot start a thread: {error}")))?;
+    // Any early end of this call cancels the work.
+    let cancelled = |error: PyErr| {
         cancel.store(true, Ordering::Relaxed);
         error
     };
@@ -145,16 +146,16 @@ pub fn long<T: Send + 'static>(
             }
             Err(RecvTimeoutError::Timeout) => {}
         }
-        py.check_signals().map_err(given_up)?;
+        py.check_signals().map_err(cancelled)?;
         if let (Some(progress), Some(news)) = (&call.progress, monitor.news()) {
-            progress.call1(py, news).map_err(given_up)?;
+            progress.call1(py, news).map_err(cancelled)?;
         }
     }
 }
 
 fn pool(threads: usize) -> Result<rayon::ThreadPool, Failure> {
     if !(1..=MOST_THREADS).contains(&threads) {
-        let message = format!("threads = {threads}: ask for 1 to {MOST_THREADS}");
+        let message = format!("threads = {threads}: expected 1 to {MOST_THREADS}");
         return Err(Failure::parameter(message));
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
@@ -172,21 +173,21 @@ fn of_panic(panic: &(dyn std::any::Any + Send)) -> Failure {
 /// The exceptions of `medial_axis/errors.py`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// What was given is wrong: a file, an array, a surface that bounds no solid.
+    /// An input is wrong: a file, an array, a surface that bounds no solid.
     Input,
     /// A parameter or a level is wrong.
     Parameter,
-    /// The method does not do this.
+    /// The method does not support the request.
     Unsupported,
-    /// The method could not do it.
+    /// The method failed.
     Failed,
-    /// It was told to stop.
+    /// The run was cancelled.
     Cancelled,
     /// A broken invariant: a fault of this program.
     Internal,
 }
 
-/// Why a call gives no result.
+/// The reason for which a call has no result.
 #[derive(Debug)]
 pub struct Failure {
     kind: Kind,
@@ -209,7 +210,7 @@ impl Failure {
         Self::new(Kind::Parameter, message)
     }
 
-    /// The failure that the runner has told.
+    /// The failure of a fault of the runner.
     pub fn of_fault(fault: Fault) -> Self {
         let kind = match fault.status {
             Status::Unsupported => Kind::Unsupported,
@@ -220,9 +221,9 @@ impl Failure {
         Self::new(kind, fault.reason)
     }
 
-    /// The failure that a panic is.
+    /// The failure of a panic.
     pub fn of_panic(message: &str) -> Self {
-        let advice = "this is a fault of medialaxis: please report it with the input";
+        let advice = "this is a bug of medialaxis, please report it with the input";
         Self::new(Kind::Internal, format!("{message}; {advice}"))
     }
 }
@@ -260,7 +261,7 @@ impl From<SimplifyError> for Failure {
     }
 }
 
-/// Errors that are always about what was given.
+/// Errors that are always about the input.
 macro_rules! about_input {
     ($($error:ty),+) => {
         $(impl From<$error> for Failure {
@@ -286,7 +287,7 @@ about_input!(
 
 // Arrays.
 
-/// Rows of an array, which live as long as this does, on whichever thread.
+/// Rows of an array, which live as long as this value, on any thread.
 pub struct Held<T: 'static> {
     rows: *const T,
     len: usize,
@@ -362,7 +363,7 @@ pub fn of_rows<'py, T: Element + Copy, const N: usize>(
     PyArray1::from_vec(py, flat).reshape([count, N])
 }
 
-/// An array that is made when it is first asked for; it cannot be written to, since others see it too.
+/// An array that is created at the first access. It is read-only, since it is shared.
 #[derive(Default)]
 pub struct Once(OnceLock<Py<PyAny>>);
 

@@ -1,5 +1,5 @@
 //! The Rust part of the Python package `medialaxis`: thin objects around the library, for `medial_axis/*.py`, which has
-//! the documentation and the types that users meet.
+//! the public types and their documentation.
 //!
 //! | file | content |
 //! |---|---|
@@ -30,7 +30,7 @@ use pyo3::prelude::*;
 use crate::calls::{Call, Failure, long, numbers, of_rows, points};
 use crate::method::Classes;
 
-/// Filled by name, so that `_medial.pyi` can be read beside it.
+/// In the order of `_medial.pyi`.
 #[pymodule]
 fn _medial(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
@@ -46,7 +46,7 @@ fn _medial(module: &Bound<'_, PyModule>) -> PyResult<()> {
     Ok(())
 }
 
-/// Runs the command and gives its exit code. `program` with `arguments` starts it again; `code` is the file of this
+/// Runs the command and returns its exit code. `program` with `arguments` starts it again; `code` is the file of this
 /// module.
 #[pyfunction]
 fn run_command(

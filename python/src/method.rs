@@ -1,8 +1,8 @@
 //! Methods: those of the program by their ids, and Python classes as [`MedialSimplifier`].
 //!
-//! A class is described, prepared and asked by `medial_axis/_plugins.py`, which users' mistakes meet first; here its
-//! answers become those of a method, and its exceptions the errors of one. Everything that it is given and gives back is
-//! in normalised units: lengths are fractions of the bounding-box diagonal.
+//! `medial_axis/_plugins.py` describes, checks, prepares and runs a class. This file converts its results to those of a
+//! method, and its exceptions to errors. All inputs and outputs of a class are in normalised units: lengths are fractions
+//! of the bounding-box diagonal.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -25,7 +25,7 @@ use serde::Deserialize;
 use crate::axis::Axis;
 use crate::calls::{Failure, Kind, of_points, of_rows, points};
 
-/// The module that stands between a class and this file.
+/// The Python module that calls the classes.
 const BETWEEN: &str = "medial_axis._plugins";
 
 fn registry() -> &'static Registry {
@@ -88,7 +88,7 @@ pub struct ClassMethod {
     presentation: Presentation,
 }
 
-/// What `_plugins.describe` says of a class.
+/// The description of a class, from `_plugins.describe`.
 #[derive(Deserialize)]
 struct Described {
     id: String,
@@ -164,30 +164,30 @@ impl Simplification for Prepared {
         let (kind, value) = match level {
             Level::Published => ("published", 0.0),
             Level::Spheres(0) => {
-                return Err(SimplifyError::Level("ask for at least one sphere".into()));
+                return Err(SimplifyError::Level("give at least one sphere".into()));
             }
             Level::Spheres(count) => ("spheres", count as f64),
             Level::Native(value) if !value.is_finite() => {
-                return Err(SimplifyError::Level(format!("{value} is not a finite number")));
+                return Err(SimplifyError::Level(format!("{value}: expected a finite number")));
             }
             Level::Native(value) => ("native", value),
         };
-        let answer = Python::attach(|py| {
-            let answer = py.import(BETWEEN)?.call_method1("at", (&self.0, kind, value))?;
-            answer.extract::<Answer>()
+        let output = Python::attach(|py| {
+            let output = py.import(BETWEEN)?.call_method1("at", (&self.0, kind, value))?;
+            output.extract::<Output>()
         });
-        let answer = answer.map_err(of_exception)?;
-        let mesh = MedialMesh::clone(&answer.axis.get().mesh);
+        let output = output.map_err(of_exception)?;
+        let mesh = MedialMesh::clone(&output.axis.get().mesh);
         let mut simplified = Simplified::new(mesh, level);
-        simplified.native_level = answer.native_level;
-        answer.warnings.into_iter().for_each(|warning| simplified.diagnostics.warn(warning));
+        simplified.native_level = output.native_level;
+        output.warnings.into_iter().for_each(|warning| simplified.diagnostics.warn(warning));
         Ok(simplified)
     }
 }
 
-/// What `_plugins.at` gives back.
+/// The return value of `_plugins.at`.
 #[derive(FromPyObject)]
-struct Answer {
+struct Output {
     axis: Py<Axis>,
     native_level: Option<f64>,
     warnings: Vec<String>,
@@ -208,12 +208,12 @@ fn of_exception(error: PyErr) -> SimplifyError {
             return SimplifyError::Cancelled;
         }
         // The type, the message and the innermost line of the user's file.
-        let told = py.import(BETWEEN).and_then(|between| between.call_method1("tell", (&error,)));
-        let told = told.and_then(|told| told.extract::<String>()).unwrap_or(message);
+        let text = py.import(BETWEEN).and_then(|m| m.call_method1("error_text", (&error,)));
+        let text = text.and_then(|text| text.extract::<String>()).unwrap_or(message);
         if error.is_instance_of::<PyMemoryError>(py) {
-            return SimplifyError::OutOfMemory(told);
+            return SimplifyError::OutOfMemory(text);
         }
-        SimplifyError::Failed(told)
+        SimplifyError::Failed(text)
     })
 }
 
@@ -244,8 +244,8 @@ impl ScriptLoader for Classes {
     }
 }
 
-/// A shape as a class sees it, in normalised units. What is asked of it is built once for all methods, and counted
-/// as a substrate that the class used.
+/// The shape for a class, in normalised units. Substrates are built once for all methods, on demand, and recorded as
+/// used by the class.
 #[pyclass(frozen, module = "medial_axis._medial")]
 pub struct ShapeHandle {
     shape: Shape,
@@ -310,7 +310,7 @@ impl ShapeHandle {
     }
 }
 
-/// What surrounds a run, as a class sees it.
+/// The context of a run, for a class.
 #[pyclass(frozen, module = "medial_axis._medial")]
 pub struct RunHandle {
     run: RunContext,

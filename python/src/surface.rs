@@ -28,7 +28,7 @@ pub struct Surface {
     faces: Once,
 }
 
-/// The surface and what was built of it.
+/// The surface and its substrates.
 pub struct Model {
     name: String,
     /// In its own units.
@@ -38,9 +38,9 @@ pub struct Model {
     truth: Option<MedialMesh>,
     tree: OnceLock<TriangleBvh>,
     inside: OnceLock<InsideTest>,
-    /// By what their samples are.
+    /// Shapes by their options.
     shapes: Mutex<Vec<(ShapeOptions, Shape)>>,
-    /// The last judge: it has as many samples as were asked.
+    /// The last judge, which serves calls with the same options.
     judge: Mutex<Option<Arc<Judge>>>,
 }
 
@@ -52,7 +52,7 @@ impl Model {
         Self { name, mesh, report, truth, tree, inside, shapes, judge }
     }
 
-    /// The shape with these samples; the same one, with what was built of it, each time.
+    /// The shape with these options. Equal options give the same shape with its substrates.
     pub fn shape(&self, options: &ShapeOptions) -> Result<Shape, Failure> {
         let mut shapes = self.shapes.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, shape)) = shapes.iter().find(|(known, _)| known == options) {
@@ -64,7 +64,7 @@ impl Model {
         Ok(shape)
     }
 
-    /// What measures medial meshes of this surface.
+    /// The judge for medial meshes of this surface.
     pub fn judge(&self, options: JudgeOptions) -> Result<Arc<Judge>, Failure> {
         let mut judge = self.judge.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = judge.as_ref().filter(|known| known.options() == options) {
@@ -88,7 +88,7 @@ impl Model {
 }
 
 impl Surface {
-    /// A surface of which it is known that it bounds a solid.
+    /// A surface that was validated before.
     pub fn new(name: String, loaded: Loaded, truth: Option<MedialMesh>) -> Self {
         let model = Arc::new(Model::new(name, loaded, truth));
         Self { model, vertices: Once::default(), faces: Once::default() }
@@ -99,12 +99,12 @@ impl Surface {
 pub fn shape_options(sampling: &str, dual: &str, seed: u64) -> Result<ShapeOptions, Failure> {
     let parsed: Sampling =
         sampling.parse().map_err(|error| Failure::parameter(format!("sampling: {error}")))?;
-    // A seed that stands in the word itself is meant more than that of the call.
+    // A seed in the word itself takes precedence over that of the call.
     let has_seed = sampling.split(':').count() > 2;
     let dual = match dual {
         "fan" => Dual::Fan,
         "delaunay" => Dual::Delaunay,
-        other => return Err(Failure::parameter(format!("dual = {other:?}: fan or delaunay"))),
+        dual => return Err(Failure::parameter(format!("{dual:?}: expected dual fan or delaunay"))),
     };
     let sampling = if has_seed { parsed } else { parsed.with_seed(seed) };
     Ok(ShapeOptions { sampling, dual: dual.into() })
@@ -160,13 +160,13 @@ impl Surface {
         Normalisation::of(&self.model.mesh).map_or(0.0, |units| units.diagonal)
     }
 
-    /// The exactly known medial axis of a built-in shape: with name, arrays and report all that a copy is made of.
+    /// The exactly known medial axis of a built-in shape, for copies.
     #[getter]
     fn truth(&self) -> Option<Axis> {
         self.model.truth.clone().map(|mesh| Axis::new(mesh, None))
     }
 
-    /// A surface from the parts of another one, unchanged. Checked again, unless it is known to bound no solid.
+    /// A surface from the parts of another one, unchanged. Validated again if `is_solid`.
     #[staticmethod]
     #[allow(clippy::too_many_arguments)]
     fn from_parts(
@@ -188,7 +188,7 @@ impl Surface {
         let truth = truth.map(|axis| MedialMesh::clone(&axis.mesh));
         let named = mesh.faces.iter().flatten().max();
         if named.is_some_and(|&vertex| vertex as usize >= mesh.vertices.len()) {
-            return Err(Failure::input(format!("{name}: a face names a missing vertex")).into());
+            return Err(Failure::input(format!("{name}: a face has a missing vertex")).into());
         }
         long(py, &call, move |_, monitor| {
             monitor.at("checking");
@@ -199,7 +199,7 @@ impl Surface {
         })
     }
 
-    /// A surface that bounds a solid, from a file or from the text of an OFF file, after repairs on demand.
+    /// A surface that bounds a solid, from a file or from the text of an OFF file, after optional repairs.
     #[staticmethod]
     #[allow(clippy::too_many_arguments)]
     fn repair(
@@ -253,7 +253,7 @@ impl Surface {
         })
     }
 
-    /// A file as a medial mesh of this surface, read and fitted as the options say, a JSON object.
+    /// A file as a medial mesh of this surface, read and fitted by options in JSON.
     fn read_axis(
         &self,
         py: Python<'_>,

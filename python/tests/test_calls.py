@@ -49,7 +49,7 @@ def test_others_run_during_a_long_call() -> None:
     seconds = time.perf_counter() - start
     done.set()
     thread.join()
-    # One tick in 5 ms if nobody held it; a lock that is held gives none.
+    # One tick in 5 ms without the lock, and none while a call holds it.
     assert ticks[0] > 10 * seconds
 
 
@@ -58,11 +58,11 @@ def test_the_number_of_threads_changes_nothing(blob: Mesh) -> None:
     assert axes[0].centres.tobytes() == axes[1].centres.tobytes()
 
 
-def test_progress_is_told_and_its_errors_are_raised(blob: Mesh) -> None:
+def test_progress_is_reported_and_its_errors_are_raised(blob: Mesh) -> None:
     fine = Mesh.read("builtin:torus:160")
-    told: list[tuple[str, float | None]] = []
-    fine.medial_axis(progress=lambda stage, share: told.append((stage, share)))
-    assert told and all(share is None or 0 <= share <= 1 for _, share in told)
+    reported: list[tuple[str, float | None]] = []
+    fine.medial_axis(progress=lambda stage, share: reported.append((stage, share)))
+    assert reported and all(share is None or 0 <= share <= 1 for _, share in reported)
 
     def refuse(stage: str, share: float | None) -> None:
         raise RuntimeError("enough")
@@ -108,7 +108,7 @@ def resident_bytes() -> int:
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="no /proc")
-def test_a_thousand_calls_leave_nothing_behind() -> None:
+def test_a_thousand_calls_leak_no_memory() -> None:
     mesh = Mesh.read("builtin:box")
     corners = np.random.default_rng(1).random((50, 3))
     initial = mesh.medial_axis()
@@ -123,7 +123,7 @@ def test_a_thousand_calls_leave_nothing_behind() -> None:
             with pytest.raises(medial_axis.ParameterError):
                 initial.simplify("angle", level=60, wrong=1)
 
-    calls(100)  # What is allocated once.
+    calls(100)  # For allocations that happen once.
     before = resident_bytes()
     calls(200)
     assert resident_bytes() - before < 20_000_000, "a thousand calls and errors"
@@ -143,9 +143,9 @@ def test_a_comparison_shows_one_line_that_updates(tmp_path: Path, capfd: pytest.
     assert "box: qmat" in "".join(states) and "left" not in shown
     assert re.fullmatch(r"compare:   0%\|          \| 0/3 \[00:\d\d<\?, box: initial\]", states[0]), states[0]
     assert re.match(r"compare: 100%\|█{10}\| 3/3 \[00:\d\d<00:00, done\]", states[-1]), states[-1]
-    told: list[tuple[str, float | None]] = []
-    assert run("function", lambda stage, share: told.append((stage, share))) == ""
-    assert [share for _, share in told] == [0, 1 / 3, 2 / 3, 1] and told[0][0].startswith("box: ")
+    calls: list[tuple[str, float | None]] = []
+    assert run("function", lambda stage, share: calls.append((stage, share))) == ""
+    assert [share for _, share in calls] == [0, 1 / 3, 2 / 3, 1] and calls[0][0].startswith("box: ")
 
     def refuse(stage: str, share: float | None) -> None:
         raise RuntimeError("enough")

@@ -1,6 +1,6 @@
-"""The notebook: its cells run, and give the outputs that are stored in it.
+"""The notebook: its cells run with the outputs that are stored in it.
 
-`python tests/test_notebook.py` stores those of now.
+`python tests/test_notebook.py` stores new outputs.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ NOTEBOOK = Path(__file__).parent.parent / "examples" / "results.ipynb"
 
 
 def run_cells(cells: list[str]) -> list[str]:
-    """What each cell prints, with the value of its last line, as a notebook shows it."""
+    """The output of each cell, with the value of its last line, as in a notebook."""
     names: dict[str, Any] = {"__name__": "__main__"}
-    told = []
+    outputs = []
     for source in cells:
         body = ast.parse(source).body
         last = body.pop() if body and isinstance(body[-1], ast.Expr) else None
@@ -31,8 +31,8 @@ def run_cells(cells: list[str]) -> list[str]:
         with contextlib.redirect_stdout(printed):
             exec(compile(ast.Module(body, []), "cell", "exec"), names)
             value = last and eval(compile(ast.Expression(last.value), "cell", "eval"), names)
-        told.append(printed.getvalue() + ("" if value is None else f"{value!r}\n"))
-    return told
+        outputs.append(printed.getvalue() + ("" if value is None else f"{value!r}\n"))
+    return outputs
 
 
 def sources(notebook: dict[str, Any]) -> list[str]:
@@ -63,7 +63,7 @@ CELLS = [
 
 
 def test_objects_in_a_notebook(tmp_path: Path) -> None:
-    """A notebook in a kernel of its own shows pictures, and a comparison as a line that updates."""
+    """A notebook with a new kernel shows pictures, and a comparison as a line that updates."""
     nbformat = pytest.importorskip("nbformat")
     nbclient = pytest.importorskip("nbclient")
     pytest.importorskip("ipykernel")
@@ -88,9 +88,9 @@ def store() -> None:
     notebook = json.loads(NOTEBOOK.read_text())
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
-        told = run_cells(sources(notebook))
+        outputs = run_cells(sources(notebook))
     code = (cell for cell in notebook["cells"] if cell["cell_type"] == "code")
-    for number, (cell, text) in enumerate(zip(code, told), 1):
+    for number, (cell, text) in enumerate(zip(code, outputs), 1):
         lines = text.splitlines(keepends=True)
         cell["execution_count"] = number
         cell["outputs"] = [{"name": "stdout", "output_type": "stream", "text": lines}] if lines else []

@@ -20,7 +20,7 @@ TETRAHEDRON = (
 
 
 def command(*words: object) -> str:
-    """What the command prints."""
+    """The output of the command."""
     run = subprocess.run(
         [sys.executable, "-m", "medial_axis", *map(str, words)], capture_output=True, text=True
     )
@@ -37,9 +37,9 @@ def test_the_numbers_are_those_of_the_command(blob: Mesh, axis: MedialAxis, tmp_
     assert ours.read_bytes() == path.read_bytes()
     text = command("evaluate", "builtin:blob", path, "--json")
     assert simplified.evaluate() == Evaluation.from_json(text)
-    told = json.loads(text)
+    printed = json.loads(text)
     fields = set(Evaluation.__dataclass_fields__)
-    assert set(told) - fields == {"version"}, "every number that the command tells has a field"
+    assert set(printed) - fields == {"version"}, "every number that the command prints has a field"
 
 
 def test_arrays_are_those_of_the_mesh(blob: Mesh, axis: MedialAxis) -> None:

@@ -45,7 +45,7 @@ def test_options_of_a_picture(blob: Mesh, axis: MedialAxis) -> None:
             render(blob, **words)  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match="show"):
         render(blob, show="error")
-    with pytest.raises(ParameterError, match="1 for 2"):
+    with pytest.raises(ParameterError, match="found 1, expected 2"):
         render(blob, [axis, axis], names=["one"])
     with pytest.raises(InputError, match="no surface"):
         render(MedialAxis([[0, 0, 0]], [1.0]))

@@ -1,6 +1,6 @@
 """Types: `simplify` with the parameters of each method, as the type checker sees them.
 
-`python tests/test_types.py` writes `medial_axis/_methods.py` anew from the descriptions of the methods.
+`python tests/test_types.py` rewrites `medial_axis/_methods.py` from the descriptions of the methods.
 """
 
 from __future__ import annotations

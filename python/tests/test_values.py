@@ -1,4 +1,4 @@
-"""Objects as values: equal, hashed, pickled, copied, in other processes; and warnings of what is not as requested."""
+"""Objects as values: equal, hashed, pickled, copied, in other processes; and warnings of results not as requested."""
 
 from __future__ import annotations
 
@@ -99,13 +99,13 @@ def test_a_level_is_needed(axis: MedialAxis) -> None:
     assert axis.simplify("angle", level="published") == axis.simplify("angle", level=60)
 
 
-def test_what_is_not_as_requested_warns(axis: MedialAxis) -> None:
+def test_results_not_as_requested_give_warnings(axis: MedialAxis) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert axis.simplify("qmat", spheres=40).run is not None
     pieces = axis.simplify("angle", level=60)
-    with pytest.warns(MedialWarning) as told:
+    with pytest.warns(MedialWarning) as warned:
         result = pieces.simplify("qmat", spheres=10)
     assert result.run is not None and any(f"{len(result)} spheres instead of 10" in note for note in result.run.warnings)
-    assert [f"qmat: {note}" for note in result.run.warnings] == [str(note.message) for note in told]
-    assert all(note.filename == __file__ for note in told), "the line of the caller"
+    assert [f"qmat: {note}" for note in result.run.warnings] == [str(note.message) for note in warned]
+    assert all(note.filename == __file__ for note in warned), "the line of the caller"

@@ -13,8 +13,7 @@ fn tube(u: f64, v: f64) -> f64 {
     0.35 + 0.05 * (5.0 * u).sin() * (4.0 * v).cos()
 }
 
-/// The point at the angles `u` along the ring and `v` around the tube, and `way` from the ring, 0,
-/// to the surface, 1.
+/// The point at the angles `u` along the ring and `v` around the tube, and `way` from the ring, 0, to the surface, 1.
 pub fn point(u: f64, v: f64, way: f64) -> Vec3 {
     let r = way * tube(u, v);
     let ring = RING + r * v.cos();

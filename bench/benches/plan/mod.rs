@@ -1,4 +1,4 @@
-//! How long each benchmark is measured, and what a run says in advance about how long it takes.
+//! The measuring time of each benchmark, and the estimate of the total time before a run.
 
 use std::env;
 use std::io::Write;
@@ -7,13 +7,13 @@ use std::time::Duration;
 
 use criterion::Criterion;
 
-/// Runs before the measuring begins.
+/// Duration of the warm-up.
 const WARM_UP: Duration = Duration::from_millis(300);
-/// Aimed at; what needs longer for the least number of samples takes it.
+/// Measuring time. Slow benchmarks take longer for the least number of samples.
 const MEASURED: Duration = Duration::from_millis(1700);
 /// Samples of each benchmark.
 const SAMPLES: usize = 10;
-/// Resamples of the statistics: with so few samples more of them tell nothing.
+/// Resamples of the statistics: with few samples, more of them add no information.
 const RESAMPLES: usize = 10_000;
 
 /// The configuration of all benchmarks.
@@ -25,15 +25,15 @@ pub fn criterion() -> Criterion {
         .nresamples(RESAMPLES)
 }
 
-/// Runs the groups of a program, after saying how long that takes.
+/// Prints the estimated time, and runs the groups of a program.
 pub fn run(slow: &[(&str, f64)], groups: fn()) {
     announce(slow);
     groups();
     Criterion::default().configure_from_args().final_summary();
 }
 
-/// Says how many benchmarks the words of the command line select, and about how long they take. `slow` says for parts of
-/// names how many seconds more each takes whose runs are longer than the samples have time.
+/// Prints the number of benchmarks that the command line selects, and their estimated time. `slow` has the additional
+/// seconds of slow benchmarks by parts of their names.
 fn announce(slow: &[(&str, f64)]) {
     let arguments: Vec<String> = env::args().skip(1).collect();
     let has = |word: &str| arguments.iter().any(|argument| argument == word);
@@ -41,13 +41,13 @@ fn announce(slow: &[(&str, f64)]) {
     if !has("--bench") || ["--list", "--test", "--help"].iter().any(|word| has(word)) {
         return;
     }
-    // Counted by the program itself, so that it holds for any filter and for whatever was registered.
+    // Counted by the program itself, so that it holds for any filter and any registered benchmark.
     let Ok(program) = env::current_exe() else { return };
     let Ok(listed) = Command::new(program).args(&arguments).arg("--list").output() else { return };
     let listed = String::from_utf8_lossy(&listed.stdout);
     let names: Vec<&str> =
         listed.lines().filter_map(|line| line.strip_suffix(": benchmark")).collect();
-    // Nothing of this program meets the filter.
+    // No benchmark of this program matches the filter.
     if names.is_empty() {
         return;
     }
@@ -55,7 +55,7 @@ fn announce(slow: &[(&str, f64)]) {
     let longer = |name: &&str| -> f64 {
         slow.iter().find(|(part, _)| name.contains(part)).map_or(0.0, |(_, seconds)| *seconds)
     };
-    // The sum of nothing is -0, which would be told.
+    // An empty sum is -0 and prints as such.
     let more = names.iter().map(longer).sum::<f64>() + 0.0;
     let seconds = names.len() as f64 * each + more;
     let quick = if has("--quick") { "; with --quick much less" } else { "" };

@@ -1,5 +1,5 @@
-//! The command with methods that go wrong in every way that was thought of: what the tests of the
-//! runner run. `cargo run --example faulty -- compare builtin:box --methods panics,qmat`.
+//! The command with faulty methods, for the tests of the runner:
+//! `cargo run --example faulty -- compare builtin:box --methods panics,qmat`.
 
 use std::hint::black_box;
 use std::process::{Command, ExitCode};
@@ -13,7 +13,7 @@ use medial::simplifier::{
 
 type Outcome = Result<Simplified, SimplifyError>;
 
-/// A method by what it does before any level, and at each. It is told whether it is the first one.
+/// A method as two functions: its preparation, and one level. The last argument of `at` is true at the first level.
 struct Faulty {
     info: MethodInfo,
     prepare: fn() -> Result<(), SimplifyError>,
@@ -38,11 +38,11 @@ impl MedialSimplifier for Faulty {
     }
 }
 
-/// The largest balls: what the faulty methods give where they are not at fault.
+/// The largest balls: the result of the faulty methods where they have no fault.
 fn largest(shape: &Shape, level: Level, _: bool) -> Outcome {
     let initial = shape.initial()?;
     let Level::Spheres(count @ 1..) = level else {
-        return Err(SimplifyError::unsupported("ask for a number of spheres, at least 1"));
+        return Err(SimplifyError::unsupported("give a number of spheres, at least 1"));
     };
     let mut order: Vec<usize> = (0..initial.spheres.len()).collect();
     order.sort_by(|&a, &b| initial.spheres[b].radius.total_cmp(&initial.spheres[a].radius));
@@ -51,7 +51,7 @@ fn largest(shape: &Shape, level: Level, _: bool) -> Outcome {
     Ok(Simplified::new(initial.induced(&keep), level))
 }
 
-/// The level at which the methods below that work for a while go wrong.
+/// The level at which the methods that fail late have their fault.
 const AT: Level = Level::Spheres(20);
 
 fn panics(shape: &Shape, level: Level, is_first: bool) -> Outcome {
@@ -66,7 +66,7 @@ fn loops(shape: &Shape, level: Level, is_first: bool) -> Outcome {
     largest(shape, level, is_first)
 }
 
-/// Reads from a pipe that nobody writes to and nobody closes.
+/// Reads from a pipe that has no data and stays open.
 fn wait_for_ever() {
     let (mut reader, writer) = std::io::pipe().expect("a pipe");
     let _ = std::io::Read::read(&mut reader, &mut [0]);
@@ -89,7 +89,7 @@ fn waits() -> Result<(), SimplifyError> {
     Ok(())
 }
 
-/// Fails with words that speak of memory, of which there is plenty.
+/// Fails with a misleading message about memory.
 fn complains() -> Result<(), SimplifyError> {
     Err(SimplifyError::Failed("unable to allocate a licence: out of memory".into()))
 }
@@ -137,14 +137,14 @@ fn talks() -> Result<(), SimplifyError> {
     Ok(())
 }
 
-/// Leaves a process behind that leaves the process group.
-fn strays() -> Result<(), SimplifyError> {
+/// Leaves a running process outside of the process group.
+fn orphans() -> Result<(), SimplifyError> {
     let started = Command::new("setsid").args(["sleep", "7654"]).spawn();
     let started = started.or_else(|_| Command::new("sleep").arg("7654").spawn());
     started.map(|_| ()).map_err(|error| SimplifyError::Failed(error.to_string()))
 }
 
-/// Gives another result each time.
+/// Returns another result each time.
 fn random(shape: &Shape, level: Level, is_first: bool) -> Outcome {
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     let nanos = now.map_or(0, |now| now.subsec_nanos());
@@ -153,8 +153,7 @@ fn random(shape: &Shape, level: Level, is_first: bool) -> Outcome {
     Ok(result)
 }
 
-/// Gives one ball at the first level that it is asked for, whichever that is: a level that a search found
-/// among others is not the same when it is asked alone.
+/// Returns one ball at its first level: a level of a search has another result when it runs alone.
 fn warms_up(shape: &Shape, level: Level, is_first: bool) -> Outcome {
     largest(shape, if is_first { Level::Spheres(1) } else { level }, is_first)
 }
@@ -177,7 +176,7 @@ fn main() -> ExitCode {
         late("invalid", invalid),
         late("empty", empty),
         early("talks", talks),
-        early("strays", strays),
+        early("orphans", orphans),
         late("random", random),
         late("warms-up", warms_up),
         early("waits", waits),

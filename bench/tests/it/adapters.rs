@@ -1,5 +1,5 @@
-//! The adapters of `examples/adapters`, with stand-ins for the programs: they write in other units, first something unfinished,
-//! and stay open in a window when they are done.
+//! The adapters of `examples/adapters`, with scripts in place of the programs: they use other units, write an incomplete
+//! file first, and continue to run after the end of their work.
 #![cfg(unix)]
 
 use std::fs;
@@ -32,7 +32,7 @@ fn normalised(folder: &Path) -> std::path::PathBuf {
 }
 
 #[test]
-fn results_of_programs_that_stay_open_are_taken_and_fitted() {
+fn results_of_programs_that_do_not_end_are_read_and_fitted() {
     if Command::new("python3").arg("--version").output().is_err() {
         skip("no python3");
         return;
@@ -72,18 +72,18 @@ fn results_of_programs_that_stay_open_are_taken_and_fitted() {
         .expect("it runs");
     assert!(begun.elapsed() < Duration::from_secs(300), "the programs are ended");
     let records = records(&out);
-    let asked = [("mattopo", "spheres"), ("matstruct", "native"), ("matfp", "published")];
-    for (method, level) in asked {
+    let expected = [("mattopo", "spheres"), ("matstruct", "native"), ("matfp", "published")];
+    for (method, level) in expected {
         let of_level = |record: &&serde_json::Value| {
-            let asked = &record["simplify"]["level"];
-            record["simplify"]["method"] == method && (asked == level || !asked[level].is_null())
+            let found = &record["simplify"]["level"];
+            record["simplify"]["method"] == method && (found == level || !found[level].is_null())
         };
         let record = records.iter().find(of_level).unwrap_or_else(|| panic!("{method}"));
-        let said = String::from_utf8_lossy(&done.stderr);
+        let stderr = String::from_utf8_lossy(&done.stderr);
         assert_eq!(
             (&record["status"], &record["simplify"]["spheres"]),
             (&"ok".into(), &20.into()),
-            "{record} {said}"
+            "{record} {stderr}"
         );
         let warnings = record["simplify"]["warnings"].to_string();
         assert!(warnings.contains("fitted: lengths times 0.1"), "{warnings}");
@@ -92,7 +92,7 @@ fn results_of_programs_that_stay_open_are_taken_and_fitted() {
 }
 
 #[test]
-fn a_program_that_is_not_there_is_named() {
+fn a_missing_program_is_named() {
     let dir = tempfile::tempdir().expect("a folder");
     let out = dir.path().join("report");
     let done = Command::new(MEDIAL)

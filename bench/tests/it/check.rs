@@ -1,4 +1,4 @@
-//! The conformance corpus: all methods of the project pass it, and methods that are broken do not.
+//! The conformance corpus: all methods of the project pass it, and broken methods fail.
 
 use std::path::Path;
 
@@ -10,12 +10,12 @@ const PLUGINS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/plugins/
 
 /// The exit code and the object of `check`.
 fn check(program: impl AsRef<Path>, arguments: &[&str]) -> (i32, Value) {
-    // A busy machine is no reason to fail.
+    // A busy machine must not fail the test.
     let patient = if arguments.contains(&"--timeout") { &[][..] } else { &["--timeout", "1800"] };
     json_of(program, &[&["check"], patient, arguments].concat())
 }
 
-/// Cases that ended so, as `method case: reason`.
+/// Cases with this outcome, as `method case: reason`.
 fn ended(object: &Value, outcome: &str) -> Vec<String> {
     let cases = object["cases"].as_array().expect("a list");
     let cases = cases.iter().filter(|case| case["outcome"] == outcome);
@@ -47,7 +47,7 @@ fn fast_methods_pass() {
     assert_passes(check(MEDIAL, &["angle", "lambda", "qmat", "pmat"]), 4);
 }
 
-/// On each push every method passes the cases that end soon; nightly all of them.
+/// On each push every method passes the fast cases, and nightly all of them.
 #[test]
 fn every_method_passes_the_core_cases() {
     let ids: Vec<String> =
@@ -67,7 +67,7 @@ fn variants_pass() {
     }
     let ranking = ["angle", "--set", "variant=grid", "--set", "size=ranking"];
     assert_passes(check(MEDIAL, &ranking), 1);
-    // A number of spheres that no lattice gives is looked for up to the finest, for minutes.
+    // The search for a sphere count that no lattice has takes minutes.
     let slow = ["defaults", "valid-sphere", "counts"];
     let names = medial_bench::check::cases().iter().map(|case| case.name);
     let rest: Vec<&str> = names.filter(|name| !slow.contains(name)).collect();
@@ -76,7 +76,7 @@ fn variants_pass() {
         check(MEDIAL, &[&["angle", "--set", "variant=grid"], &chosen[..]].concat());
     assert_eq!((code, object["passed"].as_u64()), (0, Some(rest.len() as u64)), "{object}");
     assert_passes(check(MEDIAL, &["lambda", "--set", "variant=cell"]), 1);
-    // Without a limit of rounds it takes minutes where a number of spheres is out of its reach.
+    // Without a limit of rounds it takes minutes for a sphere count that it cannot reach.
     assert_passes(check(MEDIAL, &["vmas", "--set", "iterations=20"]), 1);
 }
 
@@ -94,25 +94,30 @@ fn a_program_in_python_passes() {
     assert_passes(check(MEDIAL, &["largest", "--plugins", PLUGINS]), 1);
 }
 
-/// Method, case that finds its fault, words of the reason, case that it passes all the same.
+/// Method, case that finds its fault, part of the reason, case that it passes.
 const FAULTY: [(&str, &str, &str, &str); 11] = [
     ("panics", "valid-torus", "this method panics at 20 spheres", "no-spheres"),
-    ("loops", "valid-torus", "ended after 3 s", "repeated"),
+    (
+        "loops",
+        "valid-torus",
+        "timed out after 3 s during the case; rerun with a larger",
+        "repeated",
+    ),
     ("allocates", "valid-torus", "more than 1500 MB", "scale"),
     ("grows", "valid-parts", "more than 1500 MB", "report"),
-    ("overflows", "valid-box", "stack overflowed", "report"),
+    ("overflows", "valid-box", "stack overflow during the case", "report"),
     ("aborts", "defaults", "SIGABRT", "report"),
     ("exits", "published", "exit code 0", "report"),
     ("invalid", "valid-sphere", "radius NaN", "published"),
     ("empty", "counts", "no sphere", "published"),
-    ("random", "repeated", "a second run", "valid-sphere"),
-    ("random", "continuing", "after other levels differ from those alone", "valid-sphere"),
+    ("random", "repeated", "another result in a second run", "valid-sphere"),
+    ("random", "continuing", "another result after other levels", "valid-sphere"),
 ];
 
 #[test]
-fn faulty_methods_are_found_and_the_rest_goes_on() {
+fn faulty_methods_are_found_and_the_rest_continues() {
     for (method, finds, words, passes) in FAULTY {
-        // What ends by itself, or by its memory, may take its time on a busy machine.
+        // Methods that end by themselves, or by their memory, may take longer on a busy machine.
         let timeout = if method == "loops" { "3" } else { "60" };
         let limits = ["--timeout", timeout, "--memory", "1500"];
         let cases = [method, "--case", finds, "--case", passes];
@@ -125,20 +130,20 @@ fn faulty_methods_are_found_and_the_rest_goes_on() {
 }
 
 #[test]
-fn methods_that_only_behave_oddly_pass() {
+fn methods_that_print_unusual_output_pass() {
     assert_passes(check(faulty(), &["talks"]), 1);
 }
 
 #[test]
-fn what_does_not_exist_is_a_slip_of_the_command_line() {
-    refused(&["check", "nothing"], 2, "there are: angle");
-    refused(&["check", "qmat", "--case", "nothing"], 2, "there are: report");
-    refused(&["check", "qmat", "--set", "nothing=1"], 2, "no such parameter");
+fn unknown_names_exit_with_a_usage_error() {
+    refused(&["check", "nothing"], 2, "unknown method `nothing` (expected one of: angle");
+    refused(&["check", "qmat", "--case", "nothing"], 2, "(expected one of: report");
+    refused(&["check", "qmat", "--set", "nothing=1"], 2, "list them by `medial methods qmat`");
     refused(&["check", "qmat", "--timeout", "0"], 2, "positive");
 }
 
 #[test]
-fn lines_are_for_people() {
+fn each_case_prints_a_line() {
     let text = done(&["check", "qmat", "--case", "report", "--case", "no-spheres"]);
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines.len(), 3, "{text}");

@@ -1,4 +1,4 @@
-//! The command as its users meet it: what it prints, what it writes, how it ends.
+//! The command: printed text, written files, exit codes.
 
 use std::fs;
 use std::process::Command;
@@ -20,6 +20,28 @@ fn help_names_every_verb() {
 }
 
 #[test]
+fn every_help_ends_with_examples_that_parse() {
+    let command = medial_bench::cli::command();
+    let verbs = command.get_subcommands().filter(|verb| !verb.is_hide_set());
+    let verbs: Vec<&str> = verbs.map(clap::Command::get_name).collect();
+    assert!(verbs.len() > 15, "{verbs:?}");
+    for verb in verbs.into_iter().map(Some).chain([None]) {
+        let words: Vec<&str> = verb.into_iter().chain(["--help"]).collect();
+        let help = done(&words);
+        let (_, examples) = help.split_once("\nExamples:\n").expect("a heading of examples");
+        let examples: Vec<&str> = examples.lines().map_while(|l| l.strip_prefix("  ")).collect();
+        assert!((2..=3).contains(&examples.len()), "{verb:?}: {examples:?}");
+        let shown =
+            verb.is_none_or(|verb| examples.iter().any(|e| e.split(' ').nth(1) == Some(verb)));
+        assert!(shown, "no example runs {verb:?}: {examples:?}");
+        for example in examples {
+            let parsed = command.clone().try_get_matches_from(example.split(' '));
+            parsed.unwrap_or_else(|error| panic!("{example}: {error}"));
+        }
+    }
+}
+
+#[test]
 fn methods_and_their_parameters() {
     insta::assert_snapshot!("methods", done(&["methods"]));
     for id in ["qmat", "pmat", "hem", "angle"] {
@@ -32,7 +54,7 @@ fn methods_and_their_parameters() {
 
 #[test]
 fn datasets_are_listed() {
-    // Whatever the user of this machine has fetched.
+    // An empty cache, independent of the meshes that this machine has.
     let cache = tempfile::tempdir().expect("a folder");
     let mut command = Command::new(MEDIAL);
     let command = command.args(["datasets", "list"]).env("MEDIAL_CACHE", cache.path());
@@ -69,7 +91,7 @@ fn info_describes_a_mesh_that_it_refuses() {
 #[test]
 fn threads_change_no_byte() {
     let at = folder();
-    // The pictures and surfaces are made of what is written first.
+    // Later commands read the file of the first one.
     let mesh = "builtin:blob";
     let axis = at("qmat-1.ma");
     let simplify = |method| ["simplify", mesh, "--spheres", "100", "-m", method].to_vec();
@@ -98,7 +120,7 @@ fn threads_change_no_byte() {
 }
 
 #[test]
-fn wrong_words_end_in_usage() {
+fn wrong_arguments_exit_with_a_usage_error() {
     let cases: [&[&str]; 8] = [
         &["compare", "builtin:nothing", "--methods", "nothing"],
         &["compare", "--spheres", "0"],
@@ -146,8 +168,8 @@ fn absurd_requests_are_refused_at_once() {
         (&["evaluate", mesh, &ball, "--samples", "99999999999"], 2, "10000000"),
         (&["evaluate", mesh, &ball, "--certify", "1e-9"], 2, "1e-6"),
         (&["evaluate", mesh, &huge], 1, "huge.ma: sphere 0"),
-        (&["simplify", mesh, "-m", "qmat", "-o", &nowhere], 1, "there is no folder"),
-        (&["simplify", mesh, "-m", "qmat", "-o", "x.xyz"], 1, "\"xyz\" is not one of"),
+        (&["simplify", mesh, "-m", "qmat", "-o", &nowhere], 1, "the folder does not exist"),
+        (&["simplify", mesh, "-m", "qmat", "-o", "x.xyz"], 1, "(found \"xyz\", expected one of"),
         (&["simplify", mesh, "-m", "qmat", "--max-error", "inf"], 2, "inf"),
         (&["simplify", mesh, "-m", "qmat", "--set", "k=x", "-o", "x.ma"], 2, "k = \"x\""),
         (&["simplify", "builtin:nothing", "-m", "qmat"], 2, "`nothing`"),

@@ -1,4 +1,4 @@
-//! `medial compare` as its users meet it.
+//! `medial compare`: records, files and exit codes.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::command::{done, folder, json, records, refused, words};
 
 #[test]
-fn compare_leaves_a_row_for_every_run() {
+fn compare_records_every_run() {
     let at = folder();
     let out = at("report");
     let line = "compare builtin:box builtin:capsule --spheres 100,50 --counts-only --samples 1000";
@@ -20,9 +20,9 @@ fn compare_leaves_a_row_for_every_run() {
     let records = records(&out);
     assert_eq!(records.len(), 2 * usual * 2);
     for record in records {
-        let asked = record["simplify"]["level"]["spheres"].as_f64().expect("a count");
+        let requested = record["simplify"]["level"]["spheres"].as_f64().expect("a count");
         let reached = record["simplify"]["reached"].as_f64().expect("a count");
-        let near = (reached - asked).abs() <= 0.02 * asked;
+        let near = (reached - requested).abs() <= 0.02 * requested;
         assert_eq!(record["status"], if near { "ok" } else { "other_count" }, "{record}");
         assert_eq!(record["reason"].is_null(), near, "{record}");
         assert!(record["evaluate"]["hausdorff"].is_f64(), "{record}");
@@ -51,7 +51,7 @@ fn without_a_mesh_few_shapes_run() {
 }
 
 #[test]
-fn own_levels_bounds_chains_and_the_start_are_rows() {
+fn native_levels_bounds_chains_and_the_start_are_rows() {
     let at = folder();
     let out = at("report");
     let line = "compare builtin:capsule --methods qmat,angle --spheres 40 --max-error 0.05,0.0001 \
@@ -80,7 +80,7 @@ fn own_levels_bounds_chains_and_the_start_are_rows() {
     for level in [30.0, 60.0, 90.0] {
         assert_eq!(of("angle", serde_json::json!({ "native": level }))["status"], "ok");
     }
-    // A chain starts from what the filter left, and says so.
+    // A chain starts from the output of the filter, with a warning.
     let chain = of("angle+qmat", serde_json::json!({ "spheres": 40 }));
     assert_eq!(chain["simplify"]["spheres"], 40);
     assert!(chain["simplify"]["warnings"].to_string().contains("to start from"), "{chain}");
@@ -107,7 +107,7 @@ fn a_refused_mesh_and_an_unsupported_level_are_rows() {
     let (code, object) = json(&[&compare[..], &words(options)].concat());
     let counts = ["refused", "unsupported", "ok"].map(|status| &object["status"][status]);
     assert_eq!((code, counts), (3, [&2.into(), &1.into(), &1.into()]));
-    // The reason is printed where nothing else is, also of an earlier run.
+    // The reason is printed even with --quiet, also of an earlier run.
     let alone =
         ["compare", &bad, "--methods", "qmat,angle", "--spheres", "20", "-q", "--out", &out];
     for _ in 0..2 {
@@ -136,7 +136,7 @@ fn cubes_off(cubes: &[(f64, f64)]) -> String {
 }
 
 #[test]
-fn meshes_of_one_name_stay_apart() {
+fn meshes_with_the_same_name_get_different_results() {
     let at = folder();
     for (folder, side) in [("a", 1.0), ("b", 2.0)] {
         fs::create_dir(at(folder)).expect("made");
@@ -177,7 +177,7 @@ fn meshes_of_one_name_stay_apart() {
 }
 
 #[test]
-fn nothing_is_no_success() {
+fn empty_results_and_meshes_are_errors() {
     let at = folder();
     let (axis, empty, far) = (at("x.ma"), at("empty.ma"), at("far.off"));
     for (method, level) in [("lambda", "1"), ("angle", "180")] {
@@ -201,7 +201,7 @@ fn of_another_program(file: &str) {
 }
 
 #[test]
-fn given_files_are_rows_without_times_beside_the_methods() {
+fn external_results_are_rows_without_times() {
     let at = folder();
     let [file, copy, out] = ["theirs.ma", "copy.ma", "report"].map(&at);
     of_another_program(&file);
@@ -214,7 +214,7 @@ fn given_files_are_rows_without_times_beside_the_methods() {
     assert_eq!(code, 0, "{object}");
     assert_eq!((&object["status"]["ok"], &object["status"]["external"]), (&1.into(), &2.into()));
     let mut records = records(&out);
-    // Given files are read first, in the order of the command line.
+    // External results run first, in the order of the command line.
     records.rotate_left(2);
     let simplified = &records[0];
     assert_eq!(simplified["simplify"]["level"]["spheres"], 20, "the count of the files");
@@ -227,7 +227,7 @@ fn given_files_are_rows_without_times_beside_the_methods() {
         );
         assert!(record["simplify"]["seconds"].is_null(), "{record}");
         let warnings = record["simplify"]["warnings"].as_array().expect("a list");
-        let same = format!("the same bytes are given as {other}, too");
+        let same = format!("has the same bytes as {other}");
         assert!(warnings.contains(&same.into()), "{record}");
         // Written with all digits and read again: the same errors but for rounding.
         let [ours, given] =
@@ -239,15 +239,15 @@ fn given_files_are_rows_without_times_beside_the_methods() {
 }
 
 #[test]
-fn given_files_that_fit_no_mesh_are_refused_before_anything_runs() {
+fn external_results_without_a_mesh_are_refused_before_any_run() {
     let at = folder();
     let [file, out] = ["theirs.ma", "report"].map(&at);
     of_another_program(&file);
     for (given, meshes, why) in [
         (format!("a={file}"), &["builtin:capsule", "builtin:box"][..], "--given a@capsule="),
-        (format!("a@sphere={file}"), &["builtin:capsule"], "no mesh is called `sphere`"),
+        (format!("a@sphere={file}"), &["builtin:capsule"], "unknown mesh `sphere`"),
         ("a=nowhere.ma".to_owned(), &["builtin:capsule"], "nowhere.ma"),
-        (file.clone(), &["builtin:capsule"], "write NAME=FILE.ma"),
+        (file.clone(), &["builtin:capsule"], "expected NAME=FILE.ma"),
     ] {
         refused(&[&["compare"], meshes, &["--given", &given, "--out", &out]].concat(), 2, why);
         assert!(!Path::new(&out).exists(), "{given}");

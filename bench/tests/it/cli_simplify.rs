@@ -1,4 +1,4 @@
-//! The verbs for one mesh as their users meet them.
+//! The verbs for one mesh: `axis`, `simplify`, `evaluate`, `convert`.
 
 use std::fs;
 
@@ -49,11 +49,11 @@ fn axis_simplify_evaluate_convert() {
     done(&["convert", simple, ply]);
     done(&["convert", ply, axis]);
     assert_eq!(fs::read(axis).expect("read"), fs::read(simple).expect("read"));
-    refused(&["convert", mesh, simple], 2, "a surface is not a medial mesh");
+    refused(&["convert", mesh, simple], 2, "compute one by `medial axis ");
 }
 
 #[test]
-fn a_wrong_topology_is_said() {
+fn a_wrong_topology_gives_a_warning() {
     // One ball where the solid has a tunnel.
     let (code, object) = json(&["simplify", "builtin:torus", "-m", "lambda", "--spheres", "1"]);
     assert!(code == 0 && object["warnings"].to_string().contains("1 tunnel missing"), "{object}");

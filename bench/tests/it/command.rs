@@ -1,4 +1,4 @@
-//! The command as a test runs it, and what it leaves.
+//! Helpers of the tests: runs of the command, and its records.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -90,7 +90,7 @@ pub fn records(out: impl AsRef<Path>) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).expect("a whole record")).collect()
 }
 
-/// Records without what differs from run to run: seconds, memory, the command, and how many jobs disturbed them.
+/// Records without the fields that differ from run to run: seconds, memory, the command, and the number of jobs.
 pub fn without_timings(mut records: Vec<Value>) -> Vec<Value> {
     for record in &mut records {
         for key in ["evaluate_seconds", "repetitions", "command"] {
@@ -106,7 +106,7 @@ pub fn without_timings(mut records: Vec<Value>) -> Vec<Value> {
     records
 }
 
-/// Processes whose command line holds a text, by their numbers; none where the system does not tell.
+/// Ids of the processes with a text in the command line; none on systems without `/proc`.
 pub fn processes_with(text: &str) -> Vec<u32> {
     let Ok(entries) = fs::read_dir("/proc") else { return Vec::new() };
     let pids = entries.flatten().filter_map(|entry| entry.file_name().to_str()?.parse().ok());

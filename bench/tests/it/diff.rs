@@ -1,4 +1,4 @@
-//! `medial diff`: exit codes, and two builds that take turns.
+//! `medial diff`: exit codes, and two builds that run alternately.
 
 use std::fs;
 use std::path::Path;
@@ -25,16 +25,16 @@ fn two_folders_are_compared() {
     for out in [&old, &new] {
         done(&[&["compare", "builtin:torus:24"], &common[..], &[out]].concat());
     }
-    let said = done(&["diff", &old, &new]);
-    assert!(said.starts_with("# No regression") && said.contains("2 results"), "{said}");
+    let printed = done(&["diff", &old, &new]);
+    assert!(printed.starts_with("# No regression") && printed.contains("2 results"), "{printed}");
 
     worsen(&new, 1.01);
     let (code, object) = json(&["diff", &old, &new]);
     assert_eq!((code, object["changes"][0]["what"].as_str()), (4, Some("evaluate.hausdorff")));
-    let said = done(&["diff", &old, &new, "--error", "0.02"]);
-    assert!(said.contains("Changed otherwise: 1 change"), "{said}");
-    let said = done(&["diff", &new, &old]);
-    assert!(said.contains("1 improvement"), "{said}");
+    let printed = done(&["diff", &old, &new, "--error", "0.02"]);
+    assert!(printed.contains("Changed otherwise: 1 change"), "{printed}");
+    let printed = done(&["diff", &new, &old]);
+    assert!(printed.contains("1 improvement"), "{printed}");
     refused(&["diff", &old, "no-such-folder"], 1, "no-such-folder");
     refused(&["diff", &old, &new, "--error", "nan"], 2, "--error");
 }
@@ -43,25 +43,25 @@ fn two_folders_are_compared() {
 fn two_builds_take_turns() {
     let at = folder();
     let (study, out) = (at("study.toml"), at("out"));
-    let asked = "meshes = [\"builtin:torus:24\"]\nspheres = [30]\ncounts_only = true\n[[method]]\nid = \"pmat\"\n";
-    fs::write(&study, asked).unwrap();
+    let text = "meshes = [\"builtin:torus:24\"]\nspheres = [30]\ncounts_only = true\n[[method]]\nid = \"pmat\"\n";
+    fs::write(&study, text).unwrap();
     let options = ["--study", &study, "--out", &out, "--repeat", "5", "-q"];
     let arguments = [&["diff", "--run", MEDIAL, MEDIAL], &options[..]].concat();
     let first = run(&arguments);
-    // The machine may be so busy that one is slower: exact quantities are equal all the same.
+    // On a busy machine one build may be slower, but exact quantities are equal.
     assert!(first.0 == 0 || first.0 == 4, "{first:?}");
-    let told: Value = serde_json::from_slice(&fs::read(at("out/diff.json")).unwrap()).unwrap();
+    let diff: Value = serde_json::from_slice(&fs::read(at("out/diff.json")).unwrap()).unwrap();
     assert_eq!(
-        (told["compared"].as_u64(), told["changes"].as_array().unwrap().len()),
+        (diff["compared"].as_u64(), diff["changes"].as_array().unwrap().len()),
         (Some(1), 0)
     );
     for side in ["out/old", "out/new"] {
         assert_eq!(records(at(side))[0]["repetitions"].as_array().unwrap().len(), 5);
     }
-    // All is there: nothing is run again.
+    // All results exist: nothing runs again.
     assert_eq!(run(&arguments), first);
     let foreign = [&["diff", "--run", "/bin/echo", MEDIAL], &options[..]].concat();
-    refused(&foreign, 1, "no build of this program");
+    refused(&foreign, 1, "echo: not a build of medial (`--version` printed \"");
     let here = ["diff", "--run", MEDIAL, MEDIAL, "--study", &study, "--out", &at(".")];
     refused(&here, 1, "neither empty nor a folder of results");
 }

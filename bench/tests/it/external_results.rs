@@ -16,7 +16,7 @@ fn compared_with(given: &str, out: &str) -> Vec<Value> {
 }
 
 #[test]
-fn a_folder_states_title_citation_and_seconds_and_all_else_is_measured() {
+fn only_title_citation_and_seconds_of_a_folder_are_claims() {
     let at = folder();
     fs::create_dir(at("theirs")).expect("a folder");
     for count in ["20", "30"] {
@@ -62,7 +62,7 @@ fn surfaces_are_external_results() {
 }
 
 #[test]
-fn the_hash_of_an_input_is_that_of_the_bytes_that_were_parsed() {
+fn the_hash_of_an_input_is_that_of_the_parsed_bytes() {
     let at = folder();
     let file = at("tetrahedron.off");
     let text = "OFF\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n";

@@ -1,4 +1,4 @@
-//! `medial history` as its users meet it.
+//! `medial history`: runs, change points and exit codes.
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! The command against files and arguments as they come from elsewhere.
+//! The command with hostile files and arguments.
 
 use std::fs;
 #[cfg(unix)]
@@ -98,7 +98,7 @@ fn a_signal_leaves_no_temporary_behind() {
 }
 
 #[test]
-fn slips_are_refused_with_what_was_meant() {
+fn typing_errors_are_refused_with_a_suggestion() {
     let sphere = "builtin:sphere:8";
     for (arguments, expected) in [
         (&["simplify", sphere, "-m", "qmat", "--max-error", "5"][..], "write 0.05 for 5 %"),
@@ -121,7 +121,7 @@ fn slips_are_refused_with_what_was_meant() {
 #[test]
 fn a_result_without_a_file_is_refused_before_it_is_computed() {
     let simplify = ["simplify", "builtin:sphere:8", "-m", "qmat", "--spheres", "5"];
-    refused(&simplify, 2, "write it with -o sphere-8-qmat.ma");
+    refused(&simplify, 2, "write the result with -o sphere-8-qmat.ma");
     assert_eq!(run(&[&simplify[..], &["--json"]].concat()).0, 0);
 }
 
@@ -163,17 +163,17 @@ fn the_surface_is_named_where_it_is_at_fault() {
     lines[2] = "1e8 0 0".into();
     fs::write(&far, lines.join("\n")).expect("written");
     fs::write(&axis, "1 0 0\nv 0 0 0 0.5\n").expect("written");
-    // What the other verbs take is evaluated, and what is refused is refused by name.
-    let taken = run(&["info", &far]).0;
+    // A mesh that `info` accepts is evaluated, and a refused mesh is named.
+    let accepted = run(&["info", &far]).0;
     let (code, _, stderr) = run(&["evaluate", &far, &axis, "--samples", "99"]);
-    assert_eq!(code, taken, "{stderr}");
+    assert_eq!(code, accepted, "{stderr}");
     assert!(code == 0 || stderr.contains("far.off"), "{stderr}");
 }
 
 #[test]
-fn a_surface_with_a_hole_and_a_stray_part_is_repaired() {
+fn a_surface_with_a_hole_and_a_second_part_is_repaired() {
     let at = folder();
-    let (whole, open, mended) = (at("whole.off"), at("open.off"), at("mended.off"));
+    let (whole, open, repaired) = (at("whole.off"), at("open.off"), at("repaired.off"));
     done(&["datasets", "make", "pair", "-o", &whole]);
     let text = fs::read_to_string(&whole).expect("read");
     let mut lines: Vec<String> = text.trim_end().lines().map(str::to_owned).collect();
@@ -182,14 +182,14 @@ fn a_surface_with_a_hole_and_a_stray_part_is_repaired() {
     lines[1] = lines[1].replace(&format!(" {faces} "), &format!(" {} ", faces - 1));
     fs::write(&open, lines.join("\n")).expect("written");
     refused(&["info", &open], 1, "`medial repair --fill-holes`");
-    let repair = |more: &[&str]| json(&[&["repair", &open, "-o", &mended], more].concat());
+    let repair = |more: &[&str]| json(&[&["repair", &open, "-o", &repaired], more].concat());
     assert_eq!(repair(&[]).0, 1);
-    assert!(!fs::exists(&mended).expect("a folder"));
+    assert!(!fs::exists(&repaired).expect("a folder"));
     let (code, object) = repair(&["--fill-holes"]);
     assert_eq!((code, &object["faces"]), (0, &faces.into()), "{object}");
     let filled = serde_json::json!({ "repair": "filled_hole", "edges": 3, "triangles": 1 });
     assert_eq!(object["repairs"][0], filled, "{object}");
-    done(&["info", &mended]);
+    done(&["info", &repaired]);
     let (code, object) = repair(&["--fill-holes", "--components", "largest"]);
     assert_eq!((code, &object["components"]), (0, &1.into()), "{object}");
 }
@@ -213,7 +213,7 @@ fn artifacts_that_lead_out_of_a_store_are_not_followed() {
         let (code, object) = json(&["report", &store]);
         let warnings = object["warnings"].to_string();
         assert_eq!(code, 0, "{object}");
-        assert!(warnings.contains(&format!("{artifact} leads out of the folder")), "{warnings}");
+        assert!(warnings.contains(&format!("{artifact}: not inside the folder")), "{warnings}");
         for folder in ["store/pictures", "store/views"] {
             let files = fs::read_dir(at(folder)).map_or(0, Iterator::count);
             assert_eq!(files, 0, "{artifact}: {folder}");

@@ -65,7 +65,7 @@ fn methods_do_not_see_each_other() {
 /// The modules of a crate from below: each may use those of earlier layers and its own.
 type Layers<'a> = &'a [&'a [&'a str]];
 
-/// Inside `medial`. The kernel is a crate of its own, below all of them.
+/// Inside `medial`. The geometry kernel is a separate crate, below all of them.
 const MEDIAL: Layers<'_> = &[
     &["atomic", "colour", "diagnostics", "heap", "sum"],
     &["surface"],
@@ -130,7 +130,7 @@ fn sources(root: &Path) -> Vec<(String, PathBuf)> {
             let path = entry.expect("an entry").path();
             let relative = path.strip_prefix(root).expect("below the root");
             let first = relative.components().next().expect("a name").as_os_str().to_string_lossy();
-            // Crates of their own, the kernel too.
+            // Separate crates, also the kernel.
             if ["geometry", "tests", "benches", "examples", "lib.rs", "main.rs"].contains(&&*first)
             {
                 continue;
@@ -145,8 +145,7 @@ fn sources(root: &Path) -> Vec<(String, PathBuf)> {
     found
 }
 
-/// The modules that code names as `crate::MODULE`, or in the braces of `use crate::{...}`; comments
-/// may name any.
+/// The modules that code names as `crate::MODULE`, or in the braces of `use crate::{...}`; comments may name any.
 fn used_modules(text: &str) -> Vec<String> {
     let code = text.lines().filter(|line| !line.trim_start().starts_with("//"));
     let code = code.collect::<Vec<_>>().join("\n");

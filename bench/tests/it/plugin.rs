@@ -1,6 +1,6 @@
-//! Plug-ins: programs that do what they should, or anything else.
+//! Plug-ins: correct and faulty programs.
 //!
-//! Programs are shell scripts, so these tests need a POSIX `sh` and say so where there is none.
+//! Programs are shell scripts, so these tests need a POSIX `sh`.
 #![cfg(unix)]
 
 use std::fs;
@@ -28,7 +28,7 @@ fn written(toml: &str, files: &[(&str, &str)]) -> (TempDir, PathBuf) {
     (folder, path)
 }
 
-/// A declaration with one entry, and lines that are added to it.
+/// A declaration with one entry and further lines.
 fn entry(command: &str, levels: &str, more: &str) -> String {
     format!(
         "[[method]]\nid = \"x\"\ntitle = \"X\"\ncommand = {command}\nlevels = {levels}\n{more}\n"
@@ -52,7 +52,7 @@ fn script(text: &str) -> (TempDir, External) {
     (folder, loaded.remove(0))
 }
 
-fn ask(
+fn simplify(
     method: &External,
     shape: &Shape,
     set: &[(&str, &str)],
@@ -63,10 +63,10 @@ fn ask(
     method.prepare(shape, &params, &RunContext::with_seed(7))?.at(level)
 }
 
-/// What comes of a script that is asked for ten spheres.
+/// The outcome of a script at ten spheres.
 fn outcome(text: &str) -> Result<Simplified, SimplifyError> {
     let (_folder, method) = script(text);
-    ask(&method, &shape(), &[], Level::Spheres(10))
+    simplify(&method, &shape(), &[], Level::Spheres(10))
 }
 
 fn valid_and(more: &str) -> Result<Simplified, SimplifyError> {
@@ -95,7 +95,7 @@ fn largest(shape: &Shape, count: usize) -> MedialMesh {
 fn assert_keeps_the_largest(method: &External) -> Simplified {
     let shape = shape();
     let view = shape.view();
-    let result = ask(method, &view, &[], Level::Spheres(40)).expect("forty spheres");
+    let result = simplify(method, &view, &[], Level::Spheres(40)).expect("forty spheres");
     let expected = largest(&shape, 40);
     assert_eq!(result.mesh.edges, expected.edges);
     assert_eq!(result.mesh.faces, expected.faces);
@@ -116,48 +116,49 @@ fn the_example_in_shell_keeps_the_largest_balls() {
 }
 
 #[test]
-fn the_example_in_python_keeps_the_largest_balls_and_says_its_seconds() {
+fn the_example_in_python_keeps_the_largest_balls_and_reports_its_seconds() {
     if !medial_test_support::has_numpy() {
         return;
     }
     let method = example("largest");
     let result = assert_keeps_the_largest(&method);
-    let seconds = result.extras.get::<OwnSeconds>().expect("seconds of its own");
+    let seconds = result.extras.get::<OwnSeconds>().expect("own seconds");
     assert!(seconds.prepare.is_some() && seconds.simplify.is_some());
-    let none = ask(&method, &shape(), &[("least", "1e9")], Level::Spheres(5));
+    let none = simplify(&method, &shape(), &[("least", "1e9")], Level::Spheres(5));
     assert!(matches!(none, Err(SimplifyError::Failed(why)) if why.contains("no ball has")));
 }
 
 #[test]
-fn a_program_is_given_what_its_command_names() {
+fn a_program_gets_the_placeholders_of_its_command() {
     let command = r#"["sh", "run.sh", "{surface}", "{output}", "s={spheres},n={native}", "{seed}", "{threads}", "{k}", "{{k}}"]"#;
     let more = "native = { name = \"t\", unit = \"mm\", larger_is_coarser = true }\n\
                 params = [{ name = \"k\", default = \"1e-5\" }]";
     let text =
-        "head -n 1 \"$1\" > said; shift\nout=$1; shift\necho \"$@\" >> said\nset -- \"$out\"\n";
+        "head -n 1 \"$1\" > got; shift\nout=$1; shift\necho \"$@\" >> got\nset -- \"$out\"\n";
     let script = format!("{text}{VALID}echo '{{\"native_level\": 4}}'\n");
     let toml = entry(command, r#"["spheres", "native"]"#, more);
     let (folder, path) = written(&toml, &[("run.sh", &script)]);
     let method = plugin::load(&path, &[]).expect("a plug-in").remove(0);
-    let said = || fs::read_to_string(folder.path().join("said")).expect("said");
+    let got = || fs::read_to_string(folder.path().join("got")).expect("a file");
     let view = shape();
     let threads = rayon::current_num_threads();
-    let result = ask(&method, &view, &[], Level::Spheres(3)).expect("two spheres");
-    assert_eq!(said(), format!("OFF\ns=3,n= 7 {threads} 1e-5 {{k}}\n"));
+    let result = simplify(&method, &view, &[], Level::Spheres(3)).expect("two spheres");
+    assert_eq!(got(), format!("OFF\ns=3,n= 7 {threads} 1e-5 {{k}}\n"));
     assert_eq!((result.mesh.spheres.len(), result.native_level), (2, Some(4.0)));
-    // Nobody asked for the initial mesh: it is not made.
+    // No placeholder requires the initial mesh: it is not computed.
     assert!(view.used().is_empty());
-    let native = ask(&method, &view, &[("k", "0.25")], Level::Native(0.5)).expect("a level");
-    assert_eq!(said(), format!("OFF\ns=,n=0.5 7 {threads} 0.25 {{k}}\n"));
+    let native = simplify(&method, &view, &[("k", "0.25")], Level::Native(0.5)).expect("a level");
+    assert_eq!(got(), format!("OFF\ns=,n=0.5 7 {threads} 0.25 {{k}}\n"));
     assert_eq!(native.asked, Level::Native(0.5));
-    let published = ask(&method, &view, &[], Level::Published);
-    assert!(matches!(published, Err(SimplifyError::Unsupported { why }) if why.contains("native")));
+    let published = simplify(&method, &view, &[], Level::Published);
+    let expected = "x has no published level; give --spheres N or --level X";
+    assert!(matches!(published, Err(SimplifyError::Unsupported { why }) if why == expected));
     for set in [("k", "many"), ("k", "[1]"), ("other", "1")] {
-        let refused = ask(&method, &view, &[set], Level::Spheres(3));
+        let refused = simplify(&method, &view, &[set], Level::Spheres(3));
         assert!(matches!(refused, Err(SimplifyError::Parameter(why)) if why.contains(set.0)));
     }
     for level in [Level::Spheres(0), Level::Native(f64::NAN)] {
-        assert!(matches!(ask(&method, &view, &[], level), Err(SimplifyError::Level(_))));
+        assert!(matches!(simplify(&method, &view, &[], level), Err(SimplifyError::Level(_))));
     }
 }
 
@@ -174,15 +175,15 @@ fn results_are_carried_into_normalised_units() {
 }
 
 #[test]
-fn exit_codes_and_signals_are_told_apart() {
+fn exit_codes_and_signals_have_different_errors() {
     let unsupported = outcome("echo 'only genus 0' >&2; exit 65");
     assert!(
         matches!(unsupported, Err(SimplifyError::Unsupported { why }) if why == "only genus 0")
     );
     let failed = outcome("echo log >&2; echo 'no such sphere' >&2; exit 3").expect_err("code 3");
     assert!(matches!(failed, SimplifyError::Failed(_)));
-    assert_eq!(failed.to_string(), "failed: x ended with exit code 3: no such sphere");
-    for (script, words) in [("kill -9 $$", "lack of memory"), ("kill -SEGV $$", "SIGSEGV")] {
+    assert_eq!(failed.to_string(), "failed: x: exit code 3: no such sphere");
+    for (script, words) in [("kill -9 $$", "out of memory"), ("kill -SEGV $$", "SIGSEGV")] {
         let crashed = outcome(script).expect_err(script);
         assert!(
             matches!(&crashed, SimplifyError::Crashed(why) if why.contains(words)),
@@ -192,18 +193,18 @@ fn exit_codes_and_signals_are_told_apart() {
 }
 
 #[test]
-fn outputs_that_are_no_medial_mesh_are_invalid() {
+fn outputs_without_a_medial_mesh_are_invalid() {
     let cases = [
-        ("exit 0", "no file at {output}"),
-        ("mkdir \"$1\"", "not a file"),
+        ("exit 0", "{output}: no file"),
+        ("mkdir \"$1\"", "{output}: not a regular file"),
         ("echo garbage > \"$1\"", "line 1"),
         ("printf '1 0 0\\nv 0 0 NaN 1\\n' > \"$1\"", "NaN"),
         ("printf '1 0 0\\nv 0 0 0 -1\\n' > \"$1\"", "negative"),
         ("printf '2 0 0\\nv 0 0 0 1\\n' > \"$1\"", "announces 2 spheres"),
         ("printf '1 0 0\\nv 0 0 0 1e30\\n' > \"$1\"", "units"),
         ("printf '1 0 0\\nv 1e308 0 0 1\\n' > \"$1\"", ""),
-        ("truncate -s 1000000001 \"$1\" || exit 9", "at most"),
-        ("ln -s /dev/zero \"$1\"", "not a file"),
+        ("truncate -s 1000000001 \"$1\" || exit 9", "expected at most 1000000000"),
+        ("ln -s /dev/zero \"$1\"", "{output}: not a regular file"),
         ("head -c 100000 /dev/urandom > \"$1\"", ""),
     ];
     for (script, words) in cases {
@@ -215,7 +216,7 @@ fn outputs_that_are_no_medial_mesh_are_invalid() {
 }
 
 #[test]
-fn an_earlier_output_is_not_taken_for_the_next() {
+fn an_earlier_output_does_not_pass_for_the_next() {
     let (_folder, method) = script(&format!("test \"$2\" = 9 && exit 0\n{VALID}"));
     let shape = shape();
     let mut prepared =
@@ -225,7 +226,7 @@ fn an_earlier_output_is_not_taken_for_the_next() {
 }
 
 #[test]
-fn a_gigabyte_of_messages_is_no_problem() {
+fn a_gigabyte_of_messages_is_read_in_little_memory() {
     let before = medial_bench::provenance::peak_bytes().unwrap_or(0);
     let text = "head -c 1000000000 /dev/zero >&2; echo; echo '{\"native_level\": 1}'";
     assert_eq!(valid_and(text).expect("two spheres").native_level, Some(1.0));
@@ -241,18 +242,18 @@ fn is_running(pid_file: &Path) -> bool {
 }
 
 #[test]
-fn what_a_program_leaves_behind_is_ended_and_told() {
+fn orphans_of_a_program_are_killed_and_reported() {
     if !Path::new("/proc/self/stat").exists() {
         skip("no /proc");
         return;
     }
     let has_setsid = Command::new("setsid").arg("true").output().is_ok();
-    // The second is a child of a shell that is gone, the third has also left the process group.
+    // The parent of the second has ended, and the third has also left the process group.
     let mut ways = vec!["sleep 1000 & echo $! > pid", "(sleep 1000 & echo $! > pid)"];
     if has_setsid {
-        // Outside a worker, which adopts orphans, it is known by having been seen below the program.
+        // Outside a worker, which adopts orphans, only an earlier listing below the program has it.
         ways.push("(setsid sh -c 'echo $$ > pid; exec sleep 1000' & sleep 0.3)");
-        // Nor does it have the environment any more, but it was seen.
+        // It has no environment either, but was listed.
         ways.push(
             "env -i PATH=\"$PATH\" setsid sh -c 'echo $$ > pid; exec sleep 1000' & sleep 0.3",
         );
@@ -262,10 +263,10 @@ fn what_a_program_leaves_behind_is_ended_and_told() {
     for way in ways {
         let (folder, method) = script(&format!("{VALID}{way}\n"));
         let start = Instant::now();
-        let result = ask(&method, &shape(), &[], Level::Spheres(10)).expect("two spheres");
+        let result = simplify(&method, &shape(), &[], Level::Spheres(10)).expect("two spheres");
         assert!(start.elapsed() < Duration::from_secs(20), "{way}");
         let warnings = result.diagnostics.warnings.join("; ");
-        assert!(warnings.contains("left 1 of its processes behind"), "{way}: {warnings}");
+        assert!(warnings.contains("the program left running: 1"), "{way}: {warnings}");
         assert!(!is_running(&folder.path().join("pid")), "{way}");
     }
 }
@@ -293,7 +294,7 @@ fn a_cancelled_program_ends_with_all_that_it_started() {
 }
 
 #[test]
-fn the_memory_of_a_program_and_its_children_is_seen() {
+fn the_memory_of_a_program_and_its_children_is_measured() {
     if !Path::new("/proc/self/stat").exists() {
         skip("no /proc");
         return;
@@ -305,27 +306,28 @@ fn the_memory_of_a_program_and_its_children_is_seen() {
     assert!(peak.is_some_and(|peak| peak.0 > 40_000_000 && peak.0 < 2_000_000_000), "{peak:?}");
 }
 
-/// Run by the test below in a process of its own, since the environment belongs to all tests.
+/// Run by the test below in a new process, since all tests share the environment.
 #[test]
-#[ignore = "asks for a variable of the environment"]
+#[ignore = "requires an environment variable"]
 fn scratch_probe() {
     let scratch = PathBuf::from(std::env::var_os(SCRATCH).expect("a folder"));
-    let (folder, method) = script(&format!("{VALID}echo \"$1\" > said\n"));
-    ask(&method, &shape(), &[], Level::Spheres(10)).expect("two spheres");
-    let said = fs::read_to_string(folder.path().join("said")).expect("said");
-    assert!(Path::new(said.trim()).starts_with(&scratch), "{said}");
-    assert_eq!(fs::read_dir(scratch).expect("a folder").count(), 0, "files were left there");
+    let (folder, method) = script(&format!("{VALID}echo \"$1\" > got\n"));
+    simplify(&method, &shape(), &[], Level::Spheres(10)).expect("two spheres");
+    let got = fs::read_to_string(folder.path().join("got")).expect("a file");
+    assert!(Path::new(got.trim()).starts_with(&scratch), "{got}");
+    assert_eq!(fs::read_dir(scratch).expect("a folder").count(), 0, "files remain");
 }
 
 #[test]
-fn temporary_files_are_where_they_are_wanted_and_go() {
+fn temporary_files_are_in_the_scratch_folder_and_removed() {
     let scratch = tempfile::tempdir().expect("a folder");
     let probe = Command::new(std::env::current_exe().expect("this program"))
-        .args(["--ignored", "--exact", "scratch_probe"])
+        .args(["--ignored", "--exact", "plugin::scratch_probe"])
         .env(SCRATCH, scratch.path())
         .output()
         .expect("runs");
-    assert!(probe.status.success(), "{}", String::from_utf8_lossy(&probe.stdout));
+    let printed = String::from_utf8_lossy(&probe.stdout);
+    assert!(probe.status.success() && printed.contains("1 passed"), "{printed}");
 }
 
 #[test]
@@ -340,7 +342,7 @@ fn a_changed_script_or_declaration_has_another_fingerprint() {
     fs::write(&path, toml.replace("title = \"X\"", "title = \"Y\"")).expect("written");
     let third = fingerprint();
     assert!(first != second && second != third && first != third);
-    // Files inside of words count where the declaration lists them, and are remarked on where it does not.
+    // Files inside of words count if the declaration lists them, and give a warning otherwise.
     let inside = toml.replace("\"run.sh\"", "\"-c\", \"./run.sh; x=run.sh\"");
     let listed = format!("{inside}files = [\"run.sh\"]\n");
     let of = |toml: &str| {
@@ -357,7 +359,7 @@ fn a_changed_script_or_declaration_has_another_fingerprint() {
     assert_eq!(plugin::load(&path, &[]).expect("a plug-in")[0].fingerprint(), first);
 }
 
-/// A wrong declaration is refused with its line and a reason that has these words.
+/// A wrong declaration is refused with its line and the reason.
 #[test]
 fn wrong_declarations_are_refused_with_their_line() {
     let good = r#"["sh", "run.sh", "{output}", "{spheres}"]"#;
@@ -371,7 +373,7 @@ fn wrong_declarations_are_refused_with_their_line() {
         (more("title = "), 6, ""),
         (command("[]"), 4, "the command is empty"),
         (command(r#"["no-such-program", "{output}", "{spheres}"]"#), 4, "in PATH"),
-        (command(r#"["./run.sh", "{output}", "{spheres}"]"#), 4, "may not be executed"),
+        (command(r#"["./run.sh", "{output}", "{spheres}"]"#), 4, "that can be executed"),
         (
             command(r#"["{k}", "{output}", "{spheres}"]"#),
             4,
@@ -384,15 +386,15 @@ fn wrong_declarations_are_refused_with_their_line() {
         (command(r#"["sh", "{output}", "{spheres}", "{depth}"]"#), 4, "{depth} is neither"),
         (params("{ name = \"k\", default = 1 }"), 6, "no argument has {k}"),
         (params("{ name = \"seed\", default = 1 }"), 6, "`seed` is the name of a placeholder"),
-        (params("{ name = \"k\", default = [1] }"), 6, "`k` has a default"),
+        (params("{ name = \"k\", default = [1] }"), 6, "`k` has a wrong default"),
         (params("{ name = \"k\", default = 1 },\n{ name = \"k\", default = 2 }"), 7, "above"),
         (entry(good, "[]", ""), 5, "no level is declared"),
         (entry(good, r#"["spheres", "native"]"#, ""), 5, "describe it"),
         (entry(good, r#"["balls"]"#, ""), 5, "unknown variant `balls`"),
-        (command(good).replace("\"x\"", "\"My X\""), 2, "the id \"My X\""),
-        (command(good).replace("\"x\"", "\"-\""), 2, "the id \"-\""),
-        (more("files = [\"none\"]"), 6, "no regular file"),
-        (command(good) + &command(good), 8, "a method above is called `x`"),
+        (command(good).replace("\"x\"", "\"My X\""), 2, "invalid id (found \"My X\""),
+        (command(good).replace("\"x\"", "\"-\""), 2, "invalid id (found \"-\""),
+        (more("files = [\"none\"]"), 6, "not a regular file"),
+        (command(good) + &command(good), 8, "a method above has the id `x`"),
         ("[[method]]\nid = \"x\"\n".to_owned(), 1, "missing field"),
     ];
     for (toml, line, words) in cases {

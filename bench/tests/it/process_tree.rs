@@ -1,4 +1,4 @@
-//! Trees of processes: what a child started ends with it, and nothing else does.
+//! Process trees: exactly the descendants of a child end with it.
 #![cfg(target_os = "linux")]
 
 use std::fs;
@@ -39,14 +39,14 @@ fn a_tree_ends_as_a_whole_and_leaves_its_neighbours_alone() {
     let mut neighbour = shell(folder.path(), "exec sleep 1000");
     // Descendants of several generations, one of which leaves its session and its parent.
     let script = "sh -c 'sleep 1000 & echo $! > deep; wait' & \
-                  setsid sh -c 'echo $$ > stray; exec sleep 1000' & wait";
+                  setsid sh -c 'echo $$ > orphan; exec sleep 1000' & wait";
     let mut child = shell(folder.path(), script);
     let mut tree = Tree::of(&child);
-    let (deep, stray) = (number("deep"), number("stray"));
+    let (deep, orphan) = (number("deep"), number("orphan"));
     assert!(tree.resident_bytes() > 100_000);
     assert!(descendants(child.id()).contains(&deep));
     let status = tree.end(&mut child).expect("a status");
-    assert!(!status.success() && !runs(deep) && !runs(stray) && !runs(child.id()));
+    assert!(!status.success() && !runs(deep) && !runs(orphan) && !runs(child.id()));
     assert!(runs(neighbour.id()), "a child of the same process that is no member");
     assert_eq!(tree.end_orphans(), 0);
     neighbour.kill().and_then(|()| neighbour.wait()).expect("ended");

@@ -1,4 +1,4 @@
-//! Published meshes: fetched by clients that are scripts here, from archives that are made here.
+//! Published meshes: fetched by scripts in place of the clients, from archives that the tests write.
 #![cfg(unix)]
 
 use std::fs;
@@ -15,7 +15,7 @@ use tempfile::TempDir;
 
 use crate::command::{MEDIAL, ended, records, text_path};
 
-/// A user's machine: clients, a cache, a catalogue with two packages, and what the clients were asked.
+/// A user's machine: clients with a log of their arguments, a cache, a catalogue with two packages.
 struct Machine {
     dir: TempDir,
 }
@@ -111,7 +111,7 @@ impl Machine {
         self.client(client, &format!("exec /bin/cp {} .", text_path(&path)));
     }
 
-    /// A client that writes down what it is asked, and then does something.
+    /// A client that logs its arguments and then runs a command.
     fn client(&self, name: &str, then: &str) {
         let path = self.at("bin").join(name);
         let log = self.at("log");
@@ -120,8 +120,8 @@ impl Machine {
         fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("may run");
     }
 
-    /// What the clients were asked since the last time.
-    fn asked(&self) -> Vec<String> {
+    /// The command lines of the clients since the last call.
+    fn log(&self) -> Vec<String> {
         let text = fs::read_to_string(self.at("log")).unwrap_or_default();
         let _ = fs::remove_file(self.at("log"));
         text.lines().map(str::to_owned).collect()
@@ -140,7 +140,7 @@ impl Machine {
         (code, object.unwrap_or_else(|error| panic!("{error}: {stdout}{stderr}")), stderr)
     }
 
-    fn kept(&self, name: &str) -> Option<Vec<u8>> {
+    fn cached(&self, name: &str) -> Option<Vec<u8>> {
         fs::read(self.at("cache/meshes").join(name)).ok()
     }
 }
@@ -155,21 +155,21 @@ fn balls() -> Vec<u8> {
 }
 
 #[test]
-fn what_is_there_is_not_fetched_again() {
+fn fetched_meshes_are_not_fetched_again() {
     let machine = Machine::whole();
     let (code, object, stderr) = machine.json(&["datasets", "fetch", "public"]);
     assert_eq!(code, 0, "{stderr}");
     assert_eq!((&object["verified"], &object["wanted"]), (&3.into(), &3.into()), "{object}");
-    assert_eq!(machine.kept("rod-thin.off"), Some(content("rod-thin")));
-    let asked = machine.asked();
-    assert_eq!(asked.len(), 2, "{asked:?}");
-    assert!(asked[0].contains("download") && asked[0].ends_with("balls=1.0"), "{asked:?}");
-    assert!(asked[1].contains("--ignore-scripts") && asked[1].ends_with("ring@1.0"), "{asked:?}");
+    assert_eq!(machine.cached("rod-thin.off"), Some(content("rod-thin")));
+    let log = machine.log();
+    assert_eq!(log.len(), 2, "{log:?}");
+    assert!(log[0].contains("download") && log[0].ends_with("balls=1.0"), "{log:?}");
+    assert!(log[1].contains("--ignore-scripts") && log[1].ends_with("ring@1.0"), "{log:?}");
     let (code, object, _) = machine.json(&["datasets", "fetch", "public"]);
     assert_eq!((code, &object["fetched"]), (0, &Value::Array(vec![])));
-    assert_eq!(machine.asked(), Vec::<String>::new());
+    assert_eq!(machine.log(), Vec::<String>::new());
 
-    // What is damaged or gone is got again, and only that.
+    // Only damaged and missing files are fetched again.
     fs::write(machine.at("cache/meshes/ball.off"), "OFF\n").expect("written");
     fs::write(machine.at("cache/meshes/.medial-1-1.tmp"), "half").expect("written");
     let (_, object, _) = machine.json(&["datasets", "list"]);
@@ -178,11 +178,11 @@ fn what_is_there_is_not_fetched_again() {
     assert!(object["datasets"].as_array().is_some_and(|shapes| shapes.len() > 10));
     let (_, object, _) = machine.json(&["datasets", "fetch", "ball"]);
     assert_eq!(object["fetched"], json!(["ball"]));
-    assert_eq!(machine.asked().len(), 1);
+    assert_eq!(machine.log().len(), 1);
 }
 
 #[test]
-fn a_fetch_that_was_cut_short_goes_on() {
+fn an_interrupted_fetch_resumes() {
     let machine = Machine::whole();
     // Only the client that never ends is run under the short limit.
     assert_eq!(machine.run(&["datasets", "fetch", "deb:balls"]).0, 0);
@@ -192,10 +192,10 @@ fn a_fetch_that_was_cut_short_goes_on() {
     assert!(stderr.contains("took more than 1 s"), "{stderr}");
     assert_eq!([&object["verified"], &object["missing"]], [&json!(2), &json!(["ring"])]);
     machine.delivers("npm", "ring.tgz");
-    machine.asked();
+    machine.log();
     assert_eq!(machine.run(&["datasets", "fetch"]).0, 0);
-    let asked = machine.asked();
-    assert!(asked.len() == 1 && asked[0].starts_with("npm"), "{asked:?}");
+    let log = machine.log();
+    assert!(log.len() == 1 && log[0].starts_with("npm"), "{log:?}");
 }
 
 #[test]
@@ -206,25 +206,25 @@ fn another_content_is_refused_by_name() {
     assert_eq!(code, 3);
     assert_eq!(object["missing"], json!(["ring"]));
     assert!(stderr.contains("ring: package/ring.off of ring.tgz has another content"), "{stderr}");
-    assert_eq!(machine.kept("ring.off"), None);
-    assert_eq!(machine.kept("ball.off"), Some(content("ball")));
+    assert_eq!(machine.cached("ring.off"), None);
+    assert_eq!(machine.cached("ball.off"), Some(content("ball")));
 }
 
 #[test]
-fn a_missing_client_is_told_once_and_the_rest_goes_on() {
+fn a_missing_client_is_reported_once_and_the_rest_continues() {
     let machine = Machine::whole();
     fs::remove_file(machine.at("bin/apt-get")).expect("removed");
     let (code, _, stderr) = machine.run(&["datasets", "fetch"]);
     assert_eq!(code, 3);
     assert_eq!(stderr.matches("apt-get is not installed").count(), 1, "{stderr}");
-    assert!(machine.kept("ring.off").is_some());
+    assert!(machine.cached("ring.off").is_some());
     machine.client("apt-get", "echo no such package >&2; exit 100");
     let (_, _, stderr) = machine.run(&["datasets", "fetch"]);
     assert!(stderr.contains("no such package"), "{stderr}");
 }
 
 #[test]
-fn another_version_is_taken_for_what_is_the_same() {
+fn identical_meshes_of_another_version_are_accepted() {
     let machine = Machine::whole();
     let later = nested(&[("data/ball.off", &content("ball")), ("data/rod.off", b"OFF\n0 0 0\n")]);
     machine.archive("balls.tgz", &later);
@@ -236,7 +236,7 @@ fn another_version_is_taken_for_what_is_the_same() {
     assert_eq!(object["missing"], json!(["rod-thin"]), "{stderr}");
     assert!(stderr.contains("identical meshes from another version"), "{stderr}");
     assert!(stderr.contains("rod-thin: share/data.tar.gz!data/rod.off of"), "{stderr}");
-    assert_eq!(machine.kept("ball.off"), Some(content("ball")));
+    assert_eq!(machine.cached("ball.off"), Some(content("ball")));
 }
 
 #[test]
@@ -281,10 +281,10 @@ fn sets_are_compared_under_their_names() {
     let (code, stdout, stderr) = machine.run(&[&words[..], &["--dataset", "sphere"]].concat());
     assert_eq!(code, 0, "{stdout}{stderr}");
     let records = records(machine.at("medial-report"));
-    let told: Vec<_> =
+    let found: Vec<_> =
         records.iter().map(|r| [r["mesh"].as_str(), r["dataset"].as_str()]).collect();
     let public = ["ball", "rod-thin", "ring"].map(|name| [Some(name), Some("public")]);
-    assert_eq!(told, [&public[..], &[[Some("sphere"), Some("builtin")]]].concat());
+    assert_eq!(found, [&public[..], &[[Some("sphere"), Some("builtin")]]].concat());
 }
 
 #[test]

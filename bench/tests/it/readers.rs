@@ -1,4 +1,4 @@
-//! Files for ParaView and Blender, through VTK and trimesh: `scripts/readers.sh`, where its environment is there.
+//! Files for ParaView and Blender, through VTK and trimesh: `scripts/readers.sh`, if its environment exists.
 
 use std::path::Path;
 use std::process::Command;
@@ -9,8 +9,8 @@ use crate::command::{MEDIAL, done, folder, json, refused};
 fn python() -> Option<String> {
     let made = concat!(env!("CARGO_MANIFEST_DIR"), "/../target/readers/python/bin/python");
     let python = std::env::var("READERS_PYTHON").unwrap_or_else(|_| made.to_owned());
-    let answer = Command::new(&python).args(["-c", "import vtk, trimesh"]).output();
-    answer.is_ok_and(|output| output.status.success()).then_some(python)
+    let output = Command::new(&python).args(["-c", "import vtk, trimesh"]).output();
+    output.is_ok_and(|done| done.status.success()).then_some(python)
 }
 
 #[test]
@@ -31,7 +31,7 @@ fn vtk_and_trimesh_agree() {
     assert!(text.contains("same: ") && !text.contains("DIFFERENT"), "{text}");
 }
 
-/// What VTK and trimesh read of the files is compared above; here every option is written, and neither format read.
+/// The test above compares the content through VTK and trimesh. This one writes every option, and reads neither format.
 #[test]
 fn viewer_formats_are_written_and_never_read() {
     let at = folder();
@@ -48,7 +48,7 @@ fn viewer_formats_are_written_and_never_read() {
         assert!(!Path::new(&at("back.ma")).exists());
     }
     let (_, object) = json(&["convert", &ma, &at("e.glb")]);
-    let warning = "single precision: coordinates and radii are rounded by at most";
+    let warning = "rounded coordinates and radii to single precision, by at most";
     assert!(object["warnings"].to_string().contains(warning), "{object}");
 }
 
@@ -74,15 +74,15 @@ fn errors_are_radii_less_depths() {
 }
 
 #[test]
-fn options_that_make_no_sense_are_refused_before_anything_is_written() {
+fn unsupported_options_are_refused_before_a_file_is_written() {
     let at = folder();
     let ma = at("x.ma");
     done(&["axis", "builtin:box:8", "-o", &ma]);
     for (to, options, expected) in [
         ("x.ply", &["--color", "error"][..], "--color: "),
         ("x.vtp", &["--spheres"], "--spheres: "),
-        ("x.glb", &["--color", "error"], "name the surface with --mesh"),
-        ("x.glb", &["--mesh", "builtin:box"], "--mesh is for --color error only"),
+        ("x.glb", &["--color", "error"], "no surface; give --mesh MESH"),
+        ("x.glb", &["--mesh", "builtin:box"], "--mesh requires --color error"),
     ] {
         refused(&[&["convert", &ma, &at(to)], options].concat(), 2, expected);
         assert!(!Path::new(&at(to)).exists());

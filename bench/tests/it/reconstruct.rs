@@ -1,4 +1,4 @@
-//! `medial reconstruct` as its users meet it.
+//! `medial reconstruct`: surfaces of medial meshes, and refused requests.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::command::{done, folder, json, refused};
 
-/// Checks what both methods promise, and that `medial info` agrees.
+/// Checks the output of both methods, and that `medial info` agrees.
 fn check(object: &Value, output: &str, genus: u64) {
     let keys = "method vertices faces closed manifold genus components tolerance seconds cpu_seconds peak_bytes";
     for key in keys.split(' ') {
@@ -22,7 +22,7 @@ fn check(object: &Value, output: &str, genus: u64) {
 }
 
 #[test]
-fn a_torus_comes_back_by_either_method() {
+fn both_methods_reconstruct_a_torus() {
     let at = folder();
     let (axis, mesh) = (at("x.ma"), "builtin:torus");
     done(&["simplify", mesh, "-m", "qmat", "--spheres", "100", "-o", &axis]);
@@ -42,7 +42,7 @@ fn a_torus_comes_back_by_either_method() {
     check(&object, &crust, 1);
     assert!(object["deviation"]["max"].as_f64().expect("a number") < 0.005, "{object}");
 
-    // The spheres of a file in place of the inner poles.
+    // The spheres of a file instead of the inner poles.
     let all = at("all.ma");
     done(&["axis", mesh, "-o", &all]);
     let (code, object) = json(&[&words[..], &[&all]].concat());
@@ -51,7 +51,7 @@ fn a_torus_comes_back_by_either_method() {
     assert!(done(&[&words[..], &[&all]].concat()).contains("genus 1"));
 }
 
-/// A thin ring, whose hole a coarse surface closes, and a ball that asks for no fine one.
+/// A thin ring, whose hole a coarse surface closes, and a ball without such details.
 #[test]
 fn the_tolerance_is_as_coarse_as_the_topology_allows() {
     let at = folder();
@@ -71,7 +71,7 @@ fn the_tolerance_is_as_coarse_as_the_topology_allows() {
 }
 
 #[test]
-fn poles_that_pruning_leaves_make_a_surface() {
+fn remaining_poles_have_a_power_crust() {
     let at = folder();
     let volume = |outer: &str| {
         let path = at("crust.ply");
@@ -87,17 +87,17 @@ fn poles_that_pruning_leaves_make_a_surface() {
     assert!(4.0 < all && all < remaining && remaining < 6.5, "{all} {remaining}");
     let no_poles = ["simplify", "builtin:box", "-m", "qmat", "--power-crust", "x.ply"];
     refused(&no_poles, 2, "qmat has no poles");
-    // Spheres that are given belong to no poles. Nothing is written then, the result neither.
+    // Spheres from a file have no poles. Then no file is written, not even the result.
     let [given, pruned, crust] = ["given.ma", "pruned.ma", "none.ply"].map(&at);
     done(&["axis", "builtin:box", "-o", &given]);
     let words = ["simplify", "builtin:box", "-m", "tam-heidrich", "--initial", &given];
     let more = ["-o", &pruned, "--power-crust", &crust];
-    refused(&[&words[..], &more].concat(), 1, "no pole is left");
+    refused(&[&words[..], &more].concat(), 1, "no pole remains");
     assert!(![pruned, crust].iter().any(|path| std::path::Path::new(path).exists()));
 }
 
 #[test]
-fn what_makes_no_surface_is_said() {
+fn requests_without_a_surface_are_refused() {
     let at = folder();
     let write = |name: &str, text: &str| {
         fs::write(at(name), text).expect("written");
@@ -114,16 +114,16 @@ fn what_makes_no_surface_is_said() {
     let crust = ["--method", "power-crust"];
     let crust_of = ["--method", "power-crust", "--mesh", mesh];
     let cases: [(&[&str], &[&str], i32, &str); 12] = [
-        (&[&ball, "-o", "x.stl"], &[], 1, "\"stl\" is not one of .ply"),
-        (&[&ball, "-o", &nowhere], &[], 1, "there is no folder"),
+        (&[&ball, "-o", "x.stl"], &[], 1, "(found \"stl\", expected one of .ply"),
+        (&[&ball, "-o", &nowhere], &[], 1, "the folder does not exist; create it by `mkdir -p"),
         (&["no-such.ma", "-o", &out], &[], 1, "no-such.ma"),
         (&[&ball, "-o", &out], &crust, 2, "--mesh MESH"),
         (&["-o", &out], &[], 2, "--method power-crust"),
         (&[&ball, "-o", &out], &["--tolerance", "0"], 2, "--tolerance <FRACTION>"),
-        (&[&ball, "-o", &out], &["--tolerance", "1e-7"], 1, "is feasible"),
+        (&[&ball, "-o", &out], &["--tolerance", "1e-7"], 1, "tetrahedra); give --tolerance"),
         (&[&empty, "-o", &out], &[], 1, "empty.ma"),
         (&[&points, "-o", &out], &[], 1, "points.ma: all spheres have radius zero"),
-        (&[&specks, "-o", &out], &[], 1, "specks.ma: no sphere is thick enough"),
+        (&[&specks, "-o", &out], &[], 1, "specks.ma: every sphere is too thin"),
         (&[&huge, "-o", &out], &[], 1, "huge.ma"),
         (&[&far, "-o", &out], &crust_of, 1, "far.ma"),
     ];
@@ -136,7 +136,10 @@ fn what_makes_no_surface_is_said() {
     refused(&["reconstruct", &grown, "--mesh", mesh, "-o", &out], 1, "grown.ma");
     let words = ["--mesh", mesh, "-o", &out, "--tolerance", "1"];
     let (code, object) = json(&[&["reconstruct", &grown][..], &words].concat());
-    assert!(code == 0 && object["warnings"].to_string().contains("in its units"), "{object}");
+    assert!(
+        code == 0 && object["warnings"].to_string().contains("check surface and units"),
+        "{object}"
+    );
 
     // A ring with a hole that is much narrower than the tolerance.
     let ring: String = (0..6)
@@ -148,9 +151,9 @@ fn what_makes_no_surface_is_said() {
     let (code, object) = json(&["reconstruct", &ring, "-o", &out, "--tolerance", "0.05"]);
     assert_eq!((code, &object["union_betti"]), (0, &serde_json::json!([1, 1, 0])), "{object}");
     assert_eq!(object["betti"], serde_json::json!([1, 0, 0]), "{object}");
-    assert!(object["warnings"].to_string().contains("narrower than --tolerance"), "{object}");
+    assert!(object["warnings"].to_string().contains("give a smaller --tolerance"), "{object}");
 
-    // Lone spheres, one of them a point, are no error.
+    // Lone spheres, one of them a point, are accepted.
     let lone = write("lone.ma", "3 0 0\nv 0 0 0 1\nv 5 0 0 1\nv 9 0 0 0\n");
     let (code, object) = json(&["reconstruct", &lone, "-o", &out]);
     assert_eq!((code, &object["components"], &object["lost"]), (0, &2.into(), &1.into()));

@@ -1,4 +1,4 @@
-//! `medial render` as its users meet it.
+//! `medial render` and `medial view`: written files and refused options.
 
 use std::fs;
 use std::path::Path;
@@ -42,7 +42,7 @@ fn every_kind_of_picture_is_written() {
     }
 }
 
-/// One result has one error: that of `evaluate`, not that of the vertices that are drawn.
+/// A result has one error: that of `evaluate`, not that of the drawn vertices.
 #[test]
 fn the_error_of_a_picture_is_that_of_evaluate() {
     let at = folder();
@@ -64,22 +64,22 @@ fn wrong_words_are_named_and_nothing_is_written() {
     fs::write(&axis, "1 0 0\nv 0 0 0 0.9\n").expect("written");
     fs::write(&points, "2 1 0\nv 0 0 0 0\nv 0.5 0 0 0\ne 0 1\n").expect("written");
     let cases: [(&[&str], i32, &str); 18] = [
-        (&["--size", "800"], 2, "--size <WxH>': write"),
+        (&["--size", "800"], 2, "--size <WxH>': expected WIDTHxHEIGHT"),
         (&["--size", "8x8"], 2, "--size: a picture of 8 by 8"),
         (&["--size", "90000x10"], 2, "--size: a picture of 90000 by 10"),
-        (&["--camera", "somewhere"], 2, "--camera <VIEW>': write one of front"),
+        (&["--camera", "somewhere"], 2, "--camera <VIEW>': expected one of front"),
         (&["--camera", "0,90"], 2, "between -90 and 90"),
         (&["--camera", "0,0,0"], 2, "--camera: the camera looks from 0,0,0"),
         (&["--camera", "0,1,0", "--up", "y"], 2, "--up: 0,1,0"),
-        (&["--up", "w"], 2, "--up <DIRECTION>': write"),
+        (&["--up", "w"], 2, "--up <DIRECTION>': expected x"),
         (&["--zoom", "0"], 2, "--zoom: a zoom of 0"),
         (&["--zoom", "nan"], 2, "--zoom: a zoom of NaN"),
         (&["--background", "mauve"], 2, "or #rrggbb"),
-        (&["--max-error", "0"], 2, "more than 0 and at most 1"),
-        (&["--tolerance", "2"], 2, "more than 0 and at most 1"),
-        (&["--show", "error"], 2, "--show error: name a medial mesh"),
+        (&["--max-error", "0"], 2, "a number above 0 and at most 1"),
+        (&["--tolerance", "2"], 2, "a number above 0 and at most 1"),
+        (&["--show", "error"], 2, "--show error: no medial mesh; name one"),
         (&[&axis, &axis, "--show", "reconstruction"], 2, "--show reconstruction"),
-        (&[&axis, "--show", "error", "--tolerance", "1e-7"], 2, "is feasible"),
+        (&[&axis, "--show", "error", "--tolerance", "1e-7"], 2, "ball.ma; give --tolerance"),
         (&["no-such.ma"], 1, "no-such.ma"),
         (&[&points, "--show", "error"], 1, "points.ma: all spheres have radius zero"),
     ];
@@ -87,13 +87,13 @@ fn wrong_words_are_named_and_nothing_is_written() {
         refused(&[&["render", "builtin:sphere:8", "-o", &out], words].concat(), expected, part);
         assert!(!Path::new(&out).exists(), "{words:?} wrote a file");
     }
-    for (name, part) in [("x.jpg", "\"jpg\" is not one of .png"), ("no/x.png", "no folder")] {
+    for (name, part) in [("x.jpg", "expected one of .png"), ("no/x.png", "does not exist")] {
         refused(&["render", "builtin:sphere:8", "-o", &at(name)], 1, part);
     }
 }
 
 #[test]
-fn a_view_is_one_page_that_needs_nothing_else() {
+fn a_view_is_one_page_without_other_files() {
     let at = folder();
     let (mesh, axis, page) = ("builtin:torus", at("torus.ma"), at("view.html"));
     done(&["simplify", mesh, "-m", "qmat", "--spheres", "20", "-o", &axis]);
@@ -109,5 +109,5 @@ fn a_view_is_one_page_that_needs_nothing_else() {
     assert!(sizes[1] < sizes[0] && sizes[0] < 3_000_000, "{sizes:?}");
     fs::write(at("empty.ma"), "0 0 0\n").expect("written");
     refused(&["view", &at("empty.ma"), "-o", &page], 1, "no sphere");
-    refused(&["view", &axis, "-o", &at("view.png")], 1, "not one of .html");
+    refused(&["view", &axis, "-o", &at("view.png")], 1, "expected one of .html");
 }

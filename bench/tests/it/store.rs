@@ -1,4 +1,4 @@
-//! Results accumulate: nothing is run twice, nothing is lost, whatever ends a run.
+//! Results accumulate: nothing runs twice, and nothing is lost at any kind of end of a run.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -40,14 +40,14 @@ fn only_what_is_missing_is_run() {
     assert_eq!(fs::read(out.join("index.html")).expect("a page"), page);
     assert_eq!(fs::read(out.join("results.jsonl")).expect("results"), lines);
 
-    // Another method, another level, a variant: each adds to what is there.
+    // Another method, another level, a variant: each adds records.
     let more = ["builtin:box:8", "--methods", "qmat,pmat,qmat:k=0", "--spheres", "20,10"];
     let (_, added) = compare(&more, &out);
     assert_eq!(run_and_found(&added), (5, 1));
     let all = fs::read(out.join("results.jsonl")).expect("results");
     assert!(all.starts_with(&lines), "nothing is rewritten");
     let page = fs::read_to_string(out.join("index.html")).expect("a page");
-    assert!(page.contains("qmat k=0") && page.contains("torus"), "all of it is shown");
+    assert!(page.contains("qmat k=0") && page.contains("torus"), "the page has all records");
     for record in records(&out) {
         let artifact = record["artifact"].as_str().expect("a result");
         assert!(out.join(artifact).exists(), "{artifact}");
@@ -60,7 +60,7 @@ fn only_what_is_missing_is_run() {
 }
 
 #[test]
-fn failures_are_run_again_when_asked_or_when_a_limit_is_wider() {
+fn failures_run_again_on_request_or_with_a_larger_limit() {
     let dir = tempfile::tempdir().expect("a folder");
     let out = dir.path().join("out");
     let compare = |more: &[&str]| {
@@ -130,7 +130,7 @@ fn a_killed_run_is_continued() {
         // The workers must notice by themselves, and end.
         let deadline = Instant::now() + Duration::from_secs(60);
         while workers.iter().any(|&pid| is_worker(pid)) {
-            assert!(Instant::now() < deadline, "a worker is left: {workers:?}");
+            assert!(Instant::now() < deadline, "a worker still runs: {workers:?}");
             thread::sleep(Duration::from_millis(20));
         }
         // All lines are whole, but for a last line that may be torn.
@@ -179,14 +179,14 @@ fn torn_lines_and_temporary_files_are_removed() {
     let path = out.join("results.jsonl");
     let whole = fs::read_to_string(&path).expect("results");
     fs::write(&path, &whole[..whole.len() - 100]).expect("written");
-    let stray = out.join("axes/box-8/.medial-123-0.tmp");
-    fs::write(&stray, "half").expect("written");
-    // What is not this program's stays, whatever is asked.
+    let temporary = out.join("axes/box-8/.medial-123-0.tmp");
+    fs::write(&temporary, "half").expect("written");
+    // Files of the user stay, even with --fresh.
     let foreign = [out.join(".x.tmp"), out.join("axes/mine.txt"), out.join("plots/mine.png")];
     foreign.iter().for_each(|path| fs::write(path, "mine").expect("written"));
     let common = ["--samples", "200", "--counts-only", "--out", text(&out)];
-    refused(&[&["compare"], &words[..], &common].concat(), 0, "last line was incomplete");
-    assert!(!stray.exists());
+    refused(&[&["compare"], &words[..], &common].concat(), 0, "removed an incomplete last line");
+    assert!(!temporary.exists());
     assert_eq!(records(&out).len(), 2);
     done(&[&["compare"], &words[..], &common, &["--fresh", "--quiet"]].concat());
     assert!(foreign.iter().all(|path| path.exists()), "{foreign:?}");
@@ -208,7 +208,7 @@ fn a_small_item_after_a_large_one_shows_its_own_memory() {
 }
 
 #[test]
-fn a_study_is_a_file_and_lies_beside_its_results() {
+fn the_study_is_written_next_to_its_results() {
     let dir = tempfile::tempdir().expect("a folder");
     let (file, out) = (dir.path().join("study.toml"), dir.path().join("out"));
     let study = "meshes = [\"builtin:box:8\"]\nspheres = [30]\nsamples = 200\ncounts_only = true\n\n\
@@ -224,7 +224,7 @@ fn a_study_is_a_file_and_lies_beside_its_results() {
     // The coarse level first: it must not wait for a fine one that may take long.
     assert_eq!(records(&out).iter().filter_map(native).collect::<Vec<_>>(), [60.0, 30.0]);
 
-    // The copy asks the same again; what the command line names wins.
+    // The copy requests the same; the command line takes precedence.
     let copy = out.join("study.toml");
     let again = ["--study", text(&copy)];
     assert_eq!(run_and_found(&compare(&again, &out).1), (0, 6));
@@ -250,7 +250,7 @@ fn a_study_is_a_file_and_lies_beside_its_results() {
 
 #[test]
 #[cfg(unix)]
-fn an_interrupted_run_says_how_to_go_on() {
+fn an_interrupted_run_prints_how_to_resume() {
     let dir = tempfile::tempdir().expect("a folder");
     let out = dir.path().join("out");
     let words = ["compare", "builtin:box:8", "--methods", "qmat,waits", "--spheres", "20"];
@@ -270,9 +270,9 @@ fn an_interrupted_run_says_how_to_go_on() {
     let output = child.wait_with_output().expect("it ends");
     drop(pipe);
     let (code, _, stderr) = ended(output);
-    assert!(code == 130 && stderr.contains("the same command goes on"), "{code}: {stderr}");
+    assert!(code == 130 && stderr.contains("recorded 1 of 2 results; run"), "{code}: {stderr}");
     assert_eq!(records(&out).len(), 2);
-    // The page of the earlier run would contradict the records: it is one of the run that goes on.
+    // The page of the earlier run would contradict the records: it shows the interrupted run.
     let running = || {
         let header: Value = fs::read(out.join("header.json"))
             .map(|text| serde_json::from_slice(&text))
@@ -287,7 +287,7 @@ fn an_interrupted_run_says_how_to_go_on() {
     let page = fs::read_to_string(out.join("index.html")).expect("a page");
     assert!(page.contains("--methods pmat") && page.contains("--methods qmat,waits"));
     assert_eq!(running(), Value::Null);
-    assert!(!workers.iter().any(|&pid| is_worker(pid)), "a worker is left");
+    assert!(!workers.iter().any(|&pid| is_worker(pid)), "a worker still runs");
 }
 
 #[test]
@@ -330,7 +330,7 @@ fn progress_is_a_line_for_each_mesh_and_method() {
     let lines: Vec<&str> = stderr.lines().collect();
     assert!(lines.len() == 2 && lines[0] == "[1/4] box-8: qmat", "{stderr}");
     assert!(lines[1].starts_with("[2/4] box-8: pmat, about"), "{stderr}");
-    assert_eq!(run(&[&words[..], &more].concat()).2, "", "nothing is said of found results");
+    assert_eq!(run(&[&words[..], &more].concat()).2, "", "found results print nothing");
 }
 
 #[test]
@@ -349,16 +349,16 @@ fn a_study_in_a_folder_with_any_name_is_read_back() {
         assert_eq!(code, 0, "{stderr}");
         run_and_found(&serde_json::from_str(&stdout).expect("JSON"))
     };
-    // A name without a folder stands for the working folder.
+    // A name without a folder is in the working folder.
     assert_eq!(compare(Path::new("study.toml"), &folder), (1, 0));
     assert!(fs::read_dir(folder.join("out/pictures")).is_ok_and(|drawn| drawn.count() > 0));
-    let kept = folder.join("out/study.toml");
-    let named = fs::read_to_string(&kept).expect("a copy");
+    let copy = folder.join("out/study.toml");
+    let named = fs::read_to_string(&copy).expect("a copy");
     let named: toml::Table = named.parse().expect("TOML");
     let absolute = fs::canonicalize(&folder).expect("a folder");
     let given = Path::new(named["folder"].as_str().expect("a text"));
     assert_eq!(fs::canonicalize(given).expect("a folder"), absolute);
-    assert_eq!(compare(&kept, &folder), (0, 1), "the copy requests the same");
+    assert_eq!(compare(&copy, &folder), (0, 1), "the copy requests the same");
 }
 
 #[test]
@@ -374,7 +374,7 @@ fn a_folder_of_other_files_is_refused() {
 }
 
 #[test]
-fn results_that_are_damaged_or_gone_are_run_again() {
+fn damaged_and_missing_results_run_again() {
     let dir = tempfile::tempdir().expect("a folder");
     let (out, path) = (dir.path().join("out"), dir.path().join("out/results.jsonl"));
     let words = ["builtin:box:8", "--methods", "qmat", "--spheres", "30,20,10"];
@@ -386,18 +386,22 @@ fn results_that_are_damaged_or_gone_are_run_again() {
     fs::write(&path, lines.join("\n") + "\n").expect("written");
     let more = ["--samples", "200", "--counts-only", "--out", text(&out)];
     let (_, stdout, stderr) = run(&[&["compare"], &words[..], &more].concat());
-    assert!(stdout.contains("2 run now, 1 found") && stderr.contains("1; line 1"), "{stderr}");
+    assert!(stdout.contains("2 run now, 1 found"), "{stdout}");
+    assert!(
+        stderr.contains("1 of 3 lines have no record; their items run again; line 1"),
+        "{stderr}"
+    );
     assert_eq!(run_and_found(&compare(&words, &out).1), (0, 3));
 }
 
 #[test]
-fn the_results_that_are_kept_can_be_chosen() {
+fn keep_selects_the_results_on_disk() {
     let dir = tempfile::tempdir().expect("a folder");
     let out = dir.path().join("out");
     let words =
         ["builtin:box:40", "--methods", "angle", "--spheres", "2000", "--levels", "angle=0"];
-    // Whether the results at the count and at the level, both of more than 1,000 spheres, are there.
-    let kept = |keep: &str, run: u64| {
+    // Whether the results at the count and at the level, both of more than 1,000 spheres, are on disk.
+    let on_disk = |keep: &str, run: u64| {
         assert_eq!(
             run_and_found(&compare(&[&words[..], &["--keep", keep]].concat(), &out).1).0,
             run
@@ -407,11 +411,11 @@ fn the_results_that_are_kept_can_be_chosen() {
             .collect();
         [r#"{"spheres":2000}"#, r#"{"native":0.0}"#].map(|level| last[level])
     };
-    assert_eq!(kept("none", 2), [false, false]);
-    // What is to stay and did not is made again.
-    assert_eq!(kept("small", 1), [true, false]);
-    assert_eq!(kept("small", 0), [true, false]);
-    assert_eq!(kept("all", 1), [true, true]);
+    assert_eq!(on_disk("none", 2), [false, false]);
+    // Results that are now required on disk are computed again.
+    assert_eq!(on_disk("small", 1), [true, false]);
+    assert_eq!(on_disk("small", 0), [true, false]);
+    assert_eq!(on_disk("all", 1), [true, true]);
 }
 
 #[test]
@@ -426,7 +430,7 @@ fn nothing_outside_of_a_store_is_written_copied_or_removed() {
         let own = format!("{out}/{name}");
         let _ = fs::remove_file(&own).or_else(|_| fs::remove_dir_all(&own));
         std::os::unix::fs::symlink(at("."), &own).expect("linked");
-        refused(&[&words[..], &[&out, "--fresh"]].concat(), 1, "a link or not");
+        refused(&[&words[..], &[&out, "--fresh"]].concat(), 1, "not a regular file, but");
         fs::remove_file(&own).expect("a link");
     }
     let artifact = records(&out)[0]["artifact"].as_str().expect("a name").to_owned();
@@ -434,7 +438,7 @@ fn nothing_outside_of_a_store_is_written_copied_or_removed() {
     for (all, elsewhere) in [("1", &*mine), ("2", "axes/../../mine.ma"), ("3", "study.toml")] {
         fs::write(&path, text.replace(&artifact, elsewhere)).expect("written");
         let (_, object) = json(&["report", &out, "--out", &at(all)]);
-        assert!(object["warnings"].to_string().contains("no medial mesh of this"), "{object}");
+        assert!(object["warnings"].to_string().contains("missing or not inside"), "{object}");
     }
     // The folder itself may be a link.
     std::os::unix::fs::symlink(&out, at("link")).expect("linked");
@@ -467,7 +471,7 @@ fn pipes_devices_and_odd_names_are_refused_at_once() {
 }
 
 #[test]
-fn shards_and_jobs_give_what_one_run_gives() {
+fn shards_and_jobs_have_the_results_of_one_run() {
     let path = folder();
     let at = |name: &str| PathBuf::from(path(name));
     let words =
@@ -503,7 +507,7 @@ fn shards_and_jobs_give_what_one_run_gives() {
     let table = |out: &str| -> Vec<Vec<String>> {
         let mut rows = csv::Reader::from_path(at(out).join("results.csv")).expect("a table");
         let heads = rows.headers().expect("a head").clone();
-        let kept: Vec<usize> = (0..heads.len())
+        let columns: Vec<usize> = (0..heads.len())
             .filter(|&k| {
                 let timed = ["seconds", "substrate_", "bytes", "command", "repetition", "jobs"];
                 !timed.iter().any(|word| heads[k].contains(word))
@@ -511,7 +515,7 @@ fn shards_and_jobs_give_what_one_run_gives() {
             .collect();
         rows.records()
             .map(|row| row.expect("a row"))
-            .map(|row| kept.iter().map(|&k| row[k].to_owned()).collect())
+            .map(|row| columns.iter().map(|&k| row[k].to_owned()).collect())
             .collect()
     };
     assert_eq!([table("all"), table("jobs")], [table("whole"), table("whole")]);
@@ -529,6 +533,6 @@ fn shards_and_jobs_give_what_one_run_gives() {
     fs::create_dir(at("4")).expect("made");
     fs::write(at("4/results.jsonl"), altered).expect("written");
     let (_, object) = json(&["report", &path("2"), &path("4"), "--out", &path("both")]);
-    assert!(object["warnings"].to_string().contains("differ; the newer one"), "{object}");
+    assert!(object["warnings"].to_string().contains("differ; took the newer record"), "{object}");
     refused(&["compare", "builtin:box:8", "--shard", "4/3"], 2, "--shard 4/3");
 }

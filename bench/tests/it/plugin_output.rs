@@ -1,12 +1,11 @@
-//! Methods from elsewhere: a program, a Python script. Each stands in tables, plots, page and `medial methods`
-//! beside the built-in ones. (The third way in, a crate of one's own, has its test in `examples/plugin-crate`.)
+//! Plug-ins: a program, a Python script. Each appears in tables, plots, page and `medial methods` like the built-in
+//! methods. (The third kind, a Rust crate, has its test in `examples/plugin-crate`.)
 
 use std::fs;
 
 use crate::command::{done, folder, records, refused};
 
-/// Compares methods on a box, and asks that each has results, a line in the CSV, a curve in a plot,
-/// and its title on the page.
+/// Compares methods on a box. Each must have results, a line in the CSV, a curve in a plot, and its title on the page.
 fn compares(plugins: &[&str], methods: &[(&str, &str)]) {
     let at = folder();
     let out = at("out");
@@ -53,7 +52,7 @@ fn an_id_that_is_taken_is_refused() {
                 command = [\"sh\", \"{output}\", \"{spheres}\"]\n";
     for id in ["qmat", "initial", "given"] {
         fs::write(at("mine.toml"), text.replace("ID", id)).expect("written");
-        let why = format!("mine.toml, line 2: there is a method called `{id}` already");
+        let why = format!("mine.toml, line 2: the id `{id}` is taken; choose another");
         refused(&["methods", "--plugins", &at("mine.toml")], 2, &why);
     }
 }
