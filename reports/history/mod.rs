@@ -21,7 +21,7 @@ pub use run::{HistoryError, Point, Run, read_runs};
 
 use crate::metric::median;
 
-/// A change point that is found one run later may lie this many runs beside its earlier place.
+/// A change point that is found one run later may lie this many runs from its earlier place.
 const SAME_PLACE: usize = 3;
 
 /// An error that rises by less than this share is no regression.

@@ -269,7 +269,7 @@ const viewOf = (() => {
       this.canvas = make("canvas", { tabindex: 0 });
       this.caption = make("figcaption");
       this.figure = make("figure", { class: "side" }, make("div", { class: "bar" }, this.of, this.kind), this.canvas, this.caption);
-      // Kept, so that the picture can be copied out of the page.
+      // Preserved, so that the picture can be copied out of the page.
       this.renderer = new T.WebGLRenderer({ canvas: this.canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
       this.scene = new T.Scene();
       this.light = new T.DirectionalLight(0xffffff, 2.1);

@@ -43,7 +43,7 @@ pub(super) struct Look {
     pub(super) kind: Kind,
 }
 
-/// How a batch hides what is behind it.
+/// How a batch hides facets behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Wholly.

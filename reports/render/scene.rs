@@ -12,14 +12,14 @@ use super::picture::{Background, Picture};
 use super::raster::{Batch, Facet, Kind, Look, PixelLight, rasterise};
 use super::{FEWEST_PIXELS, MOST_PIXELS, RenderError};
 
-/// What a picture is of, but for the camera.
+/// A picture's content, without the camera.
 #[derive(Clone, Debug)]
 pub struct Scene<'a> {
-    /// What is drawn. All in one unit.
+    /// The drawn layers, all in one unit.
     pub layers: Vec<Layer<'a>>,
     /// Width and height in pixels.
     pub size: [usize; 2],
-    /// What is behind everything.
+    /// The background.
     pub background: Background,
 }
 
@@ -195,11 +195,11 @@ impl Layer<'_> {
                 (surface_facets(mesh, facing), Look { paint, ink: GLASS_INK, kind })
             }
             Self::Values { mesh, values, scale } => {
-                let (vertices, given) = (mesh.vertices.len(), values.len());
-                if vertices != given {
-                    return Err(RenderError::Values { values: given, vertices });
+                let (vertices, found) = (mesh.vertices.len(), values.len());
+                if vertices != found {
+                    return Err(RenderError::Values { values: found, vertices });
                 }
-                // No lines: ink would be taken for a value.
+                // No lines: ink would look like a value.
                 let look = Look { paint: Paint::map(scale.map), ink: 0.0, kind: Kind::Solid };
                 (surface_facets(mesh, |v, _| scale.place(values[v as usize])), look)
             }

@@ -1,4 +1,4 @@
-//! The strip: several medial meshes of one shape beside each other, from one camera and with one scale.
+//! The strip: several medial meshes of one shape side by side, from one camera and with one scale.
 
 use medial::complex::MedialMesh;
 use medial::surface::TriMesh;
@@ -9,7 +9,7 @@ use super::picture::{Background, Bar, LINE, Picture, fitted, letter_size, text_w
 use super::scene::{Layer, Scale, Scene};
 use crate::text::round_up;
 
-/// What medial meshes are coloured by, before the scale is known.
+/// The colouring of medial meshes, before the scale is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ColourBy {
     /// The radii of the spheres.
@@ -36,7 +36,7 @@ pub struct Errors<'a> {
     pub mesh: &'a TriMesh,
     /// For each vertex its distance, positive outside, in the unit of the mesh.
     pub values: &'a [f64],
-    /// What stands below it.
+    /// The caption.
     pub caption: String,
 }
 
@@ -83,7 +83,7 @@ impl Errors<'_> {
 pub struct Panel<'a> {
     /// The medial mesh.
     pub axis: &'a MedialMesh,
-    /// What stands below it.
+    /// The caption.
     pub caption: String,
     /// Its reconstruction, for the second row.
     pub errors: Option<Errors<'a>>,
@@ -100,9 +100,9 @@ pub struct Strip<'a> {
     pub camera: Camera,
     /// Width and height of a panel, without its caption.
     pub size: [usize; 2],
-    /// Panels beside each other, before the next ones begin a line of their own below them.
+    /// Panels in a line.
     pub across: usize,
-    /// What is behind everything.
+    /// The background.
     pub background: Background,
     /// The colours of the medial meshes.
     pub colour: ColourBy,

@@ -53,14 +53,14 @@ impl Table {
         self.notes.truncate(1); // the command
         for (k, column) in self.columns.iter().enumerate() {
             if column.title.starts_with("topology") {
-                let verdicts = [("1 of 1", "yes"), ("0 of 1", "no")];
+                let words = [("1 of 1", "yes"), ("0 of 1", "no")];
                 for cell in self.rows.iter_mut().map(|row| &mut row[k]) {
-                    let verdict = verdicts.iter().find(|(share, _)| *share == cell.text);
-                    *cell = verdict.map_or(cell.clone(), |(_, verdict)| (*verdict).into());
+                    let word = words.iter().find(|(share, _)| *share == cell.text);
+                    *cell = word.map_or(cell.clone(), |(_, word)| (*word).into());
                 }
             }
         }
-        self.without(&["means over", "meshes", "kept on", "on", "failed"])
+        self.without(&["means over", "meshes", "valid on", "on", "failed"])
     }
 
     /// The table without some columns, by their titles.
@@ -132,7 +132,7 @@ impl Column {
     }
 }
 
-/// What stands where there is nothing.
+/// The mark of an empty cell.
 const UNKNOWN: &str = "–";
 
 /// One cell.

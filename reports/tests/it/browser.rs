@@ -1,5 +1,4 @@
-//! The page in a browser, from disk and without a network: no error, no request, and the answers of
-//! `page_checks.txt`.
+//! Runs the checks of `page_checks.txt` in a browser, from disk and without a network: no error, no request.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -22,14 +21,14 @@ const COUNTS: [usize; 4] = [1000, 500, 200, 100];
 /// What takes longer has failed.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A browser without a window, told what to do through a pipe by its DevTools protocol.
+/// A browser without a window, controlled through a pipe by its DevTools protocol.
 struct Browser {
     child: Child,
     to: ChildStdin,
     from: Receiver<Value>,
     last: u64,
     session: Option<String>,
-    /// What it said without being asked.
+    /// Its events.
     events: Vec<Value>,
 }
 
@@ -114,7 +113,7 @@ impl Browser {
         answer["result"]["value"].clone()
     }
 
-    /// Waits for what must become true.
+    /// Waits until a condition holds.
     fn until(&mut self, expression: &str) {
         let start = Instant::now();
         while self.value(expression) != true {
@@ -220,7 +219,7 @@ fn write_views(folder: &Path, records: &[Record]) {
 }
 
 #[test]
-fn the_page_answers_from_disk() {
+fn the_page_works_from_disk() {
     let folder = tempfile::tempdir().unwrap();
     let profile = tempfile::tempdir().unwrap();
     let Some(mut browser) = Browser::start(profile.path()) else { return };
@@ -236,7 +235,7 @@ fn the_page_answers_from_disk() {
         match event["method"].as_str().unwrap_or_default() {
             "Network.requestWillBeSent" => {
                 let url = params["request"]["url"].as_str().unwrap();
-                // Scripts that the page makes of its own text are no request.
+                // Scripts made from the page's text are no requests.
                 assert!(url.starts_with("file:") || url.starts_with("blob:"), "{url}");
                 requests += usize::from(url.starts_with("file:"));
             }
