@@ -38,7 +38,7 @@ struct Found {
 }
 
 /// A criterion and its values; less is better.
-struct Question {
+struct Criterion {
     title: String,
     /// The values of a series.
     values: Vec<Values>,
@@ -88,8 +88,8 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
 /// The rows at one number of spheres.
 fn at_count(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Vec<Cell>> {
     let spheres = counted(spheres, "sphere", "spheres");
-    let error = error_question(errors_at(comparison, level), format!("lowest error at {spheres}"));
-    let triangles = Question {
+    let error = error_criterion(errors_at(comparison, level), format!("lowest error at {spheres}"));
+    let triangles = Criterion {
         title: format!("best triangles at {spheres}, errors up to {USABLE} %"),
         values: values(comparison, Some(level), |entry| {
             HAUSDORFF.of(entry.record).filter(|&e| entry.comparable() && e <= USABLE)?;
@@ -99,14 +99,14 @@ fn at_count(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Ve
         text: |value| format!("least angle {:.1}°", 60.0 - value),
         of: "its distance from 60°",
     };
-    let mut rows: Vec<Vec<Cell>> = answers(comparison, &error);
+    let mut rows: Vec<Vec<Cell>> = rows_of(comparison, &error);
     rows.push(right_everywhere(comparison, level, &spheres));
-    rows.extend(answers(comparison, &triangles));
+    rows.extend(rows_of(comparison, &triangles));
     rows
 }
 
-fn error_question(values: Vec<Values>, title: String) -> Question {
-    Question {
+fn error_criterion(values: Vec<Values>, title: String) -> Criterion {
+    Criterion {
         title,
         values,
         text: |value| format!("{} %", significant(value, 3)),
@@ -144,7 +144,7 @@ fn within_bound(comparison: &Comparison<'_>) -> Vec<Vec<Cell>> {
             cost(entry.record)
         });
         let title = format!("{title} within {BOUND} % error");
-        rows.extend(answers(comparison, &Question { title, values, text, of }));
+        rows.extend(rows_of(comparison, &Criterion { title, values, text, of }));
     }
     rows
 }
@@ -270,43 +270,43 @@ fn ranked(values: &[Values]) -> Vec<Rank> {
 
 /// The rows of a criterion: the best median, and if different the method with the most results. Empty if no method
 /// has a median.
-fn answers(comparison: &Comparison<'_>, question: &Question) -> Vec<Vec<Cell>> {
-    let mut ranks = ranked(&question.values);
+fn rows_of(comparison: &Comparison<'_>, criterion: &Criterion) -> Vec<Vec<Cell>> {
+    let mut ranks = ranked(&criterion.values);
     let Some(first) = ranks.first().map(|rank| rank.series) else { return vec![] };
-    let mut rows = vec![answer(comparison, question, question.title.clone(), &ranks)];
+    let mut rows = vec![row_of(comparison, criterion, criterion.title.clone(), &ranks)];
     ranks.sort_by(by_meshes);
     if ranks[0].series != first {
-        let title = format!("{}, on the most meshes", question.title);
-        rows.push(answer(comparison, question, title, &ranks));
+        let title = format!("{}, on the most meshes", criterion.title);
+        rows.push(row_of(comparison, criterion, title, &ranks));
     }
     rows
 }
 
 /// The row of the first of the ranked methods.
-fn answer(
+fn row_of(
     comparison: &Comparison<'_>,
-    question: &Question,
+    criterion: &Criterion,
     title: String,
     ranks: &[Rank],
 ) -> Vec<Cell> {
     let first = ranks[0].series;
-    let known = question.values[first].iter().flatten();
+    let known = criterion.values[first].iter().flatten();
     let met = known.clone().filter(|found| found.value.is_finite());
     let seconds = middle(met.clone().map(|found| found.seconds));
     let mut cells = vec![
         Cell::from(title),
         Cell { best: true, ..Cell::from(comparison.series[first].as_str()) },
-        Cell::optional(ranks[0].median.map(question.text)),
+        Cell::optional(ranks[0].median.map(criterion.text)),
         Cell::optional(seconds.map(|seconds| significant(seconds, 3))),
         Cell::from(format!("{} of {}", met.count(), counted(known.count(), "mesh", "meshes"))),
     ];
     let runner_up = ranks.get(1).and_then(|rank| {
-        Some((rank.series, lead(&question.values[first], &question.values[rank.series])?))
+        Some((rank.series, lead(&criterion.values[first], &criterion.values[rank.series])?))
     });
     cells.extend(match runner_up {
         Some((second, ratio)) => [
             Cell::from(comparison.series[second].as_str()),
-            Cell::from(format!("{} of {}", significant(ratio, 2), question.of)),
+            Cell::from(format!("{} of {}", significant(ratio, 2), criterion.of)),
         ],
         None => [Cell::from("no other"), Cell::optional(None)],
     });
@@ -330,7 +330,7 @@ fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) ->
         cells.extend([(); 5].map(|()| Cell::optional(None)));
         return cells;
     }
-    answer(comparison, &error_question(errors, title.clone()), title, &ranks)
+    row_of(comparison, &error_criterion(errors, title.clone()), title, &ranks)
 }
 
 /// All methods at one error bound.

@@ -275,7 +275,7 @@ fn mesh_labels(keys: &[MeshKey<'_>]) -> Vec<String> {
     labels
 }
 
-/// Enough of a hash to tell a few apart.
+/// Enough of a hash to distinguish a few.
 fn short(hash: &str) -> String {
     hash.chars().take(8).collect()
 }

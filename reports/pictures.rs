@@ -95,7 +95,7 @@ pub(crate) fn strips(comparison: &Comparison<'_>) -> BTreeMap<usize, PictureStri
 
 /// Of some meshes the one that separates the methods best at the count of the strips: among those that the most
 /// methods ran on the one with the largest ratio of the worst error to the best.
-pub(crate) fn most_telling(
+pub(crate) fn widest_spread(
     comparison: &Comparison<'_>,
     meshes: impl Iterator<Item = usize>,
 ) -> Option<usize> {

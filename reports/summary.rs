@@ -76,7 +76,7 @@ impl SeriesSummary {
         self.means.get(metric.key).map(|(mean, _)| *mean)
     }
 
-    /// Meshes that the mean of a metric is over: where a result has no triangle, say, there is no angle.
+    /// Meshes that the mean of a metric is over: a result without a triangle, for example, has no angle.
     pub(crate) fn over(&self, metric: &Metric) -> usize {
         self.means.get(metric.key).map_or(0, |(_, over)| *over)
     }
@@ -197,7 +197,7 @@ fn at_count(
         reached.retain(|entry| entry.comparable()); // of all meshes, not of the own set
         let mut without = BTreeMap::new();
         for entry in entries.iter().filter(|entry| !entry.comparable()) {
-            // Also where the status of an older build does not say so.
+            // Also for records of older builds, which lack this status.
             let status = entry.record.status;
             let status = if status.is_ok() { Status::OtherCount } else { status };
             *without.entry(status).or_default() += 1;

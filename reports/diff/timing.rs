@@ -103,7 +103,7 @@ pub(super) fn timings(pairs: &[Pair<'_>], options: &DiffOptions) -> (Vec<Timing>
     if repeated.len() < with_result {
         untimed.push(format!(
             "{} of {with_result} pairs have fewer than {LEAST_REPETITIONS} repetitions: seconds vary too much to be \
-             compared; ask for --repeat 10",
+             compared; use --repeat 10",
             with_result - repeated.len()
         ));
     }

@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 use crate::comparison::{Comparison, level_label};
 use crate::header::{Header, MethodNote, RunNote};
 use crate::metric::{BELOW_30, COMPARED, EPSILON, Metric, SPHERES_ONLY};
-use crate::pictures::most_telling;
+use crate::pictures::widest_spread;
 use crate::plots::{Figure, symbol};
 use crate::record::Machine;
 use crate::tables::Table;
@@ -208,7 +208,7 @@ impl Page<'_> {
             "meshes": (0..self.meshes.len()).map(|mesh| self.mesh(mesh)).collect::<Vec<_>>(),
             "answers": self.answers.as_ref().map(without_command),
             "overview": self.overview,
-            "leading": most_telling(comparison, pictured),
+            "leading": widest_spread(comparison, pictured),
             "not_run": is_compared.then(|| json!({
                 "methods": absent.iter().map(|note| described(note)).collect::<Vec<_>>(),
                 "command": header.command_with(&ids),

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::metric::COMPARED;
 use crate::record::{Record, Target};
-use crate::tables::{Best, flatten, remark, topology_verdict, warnings};
+use crate::tables::{Best, flatten, remark, topology_word, warnings};
 use crate::text::significant;
 
 /// A larger table would exhaust a browser's memory.
@@ -59,7 +59,7 @@ fn row(comparison: &Comparison<'_>, entry: &Entry<'_>, best: &Best) -> Vec<(Stri
         ("count", json!(count)),
         ("status", json!(record.status.to_string())),
         ("spheres", json!(reached(record))),
-        ("topology", json!(topology_verdict(entry))),
+        ("topology", json!(topology_word(entry))),
         ("rising", json!(comparison.is_rising(entry).then_some(1))),
         ("remark", json!(remark(entry))),
         ("link", json!(record.artifact.as_deref().and_then(local_link))),

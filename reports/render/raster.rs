@@ -48,7 +48,7 @@ pub(super) struct Look {
 pub(super) enum Kind {
     /// Wholly.
     Solid,
-    /// Hardly.
+    /// Almost not.
     Glass,
     /// As glass, and seen only where nothing solid is, before or behind.
     Ghost,

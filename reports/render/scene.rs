@@ -384,7 +384,7 @@ fn smooth_normals(mesh: &TriMesh, flat: &[Vec3]) -> Vec<[Vec3; 3]> {
                 let (u, v) = (b - a, c - a);
                 let lengths = u.length() * v.length();
                 let sine = u.cross(v).length() / lengths;
-                // Zero lengths: a face without area has no say.
+                // Zero lengths: a face without area has no weight.
                 if sine.is_finite() { sine / lengths * flat[face] } else { Vec3::ZERO }
             })
             .sum();

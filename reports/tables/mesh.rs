@@ -39,7 +39,7 @@ impl Best {
 }
 
 /// Whether the Betti numbers are the solid's: `yes`, `no`, or a dash where one is unknown.
-pub(crate) fn topology_verdict(entry: &Entry<'_>) -> &'static str {
+pub(crate) fn topology_word(entry: &Entry<'_>) -> &'static str {
     let evaluation = entry.record.evaluate.as_ref();
     match evaluation.and_then(|e| Some((e.betti, e.expected_betti?))) {
         Some((found, expected)) if found == expected => "yes",
@@ -94,7 +94,7 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
         let evaluation = entry.record.evaluate.as_ref();
         Cell::optional(evaluation.map(|evaluation| betti(Some(evaluation.betti))))
     });
-    rows = rows.text("as solid", topology_verdict);
+    rows = rows.text("as solid", topology_word);
     rows = rows.text("remark", remark);
     let mut notes = vec![how.to_owned()];
     if let Some(initial) = entries.iter().find_map(|entry| entry.record.initial) {

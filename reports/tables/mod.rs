@@ -10,7 +10,7 @@ use serde::{Serialize, Serializer};
 use crate::text::{escape_html, printable};
 
 pub(crate) use self::csv::{flatten, to_csv, warnings};
-pub(crate) use self::mesh::{Best, mesh_table, remark, topology_verdict};
+pub(crate) use self::mesh::{Best, mesh_table, remark, topology_word};
 
 /// A table before it takes a format.
 #[derive(Clone, Default, Serialize)]

@@ -40,7 +40,7 @@ impl Browser {
             medial_test_support::skip("no chromium");
             return None;
         }
-        // The protocol speaks on the descriptors 3 and 4.
+        // The protocol uses the descriptors 3 and 4.
         let redirected = "exec \"$@\" 3<&0 4>&1 </dev/null >/dev/null 2>/dev/null";
         let mut child = Command::new("sh")
             .args(["-c", redirected, "sh", BROWSER, "--headless", "--no-sandbox", "--disable-gpu"])
@@ -161,7 +161,7 @@ impl Browser {
         }
     }
 
-    /// Takes steps: each line is a word and what it is about, as the head of the file says.
+    /// Takes steps: each line is a word and its argument, as the head of the file defines.
     fn run(&mut self, steps: &str) {
         for (number, line) in steps.lines().enumerate() {
             let Some((word, what)) = line.split_once(' ').filter(|_| !line.starts_with('#')) else {

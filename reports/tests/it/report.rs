@@ -194,7 +194,7 @@ fn a_curve_is_over_one_set_of_meshes() {
     assert!(rows[0].contains("| 2 of 3 |") && rows[1].contains("| 2 of 3 |"), "{rows:?}");
 }
 
-/// A result without a triangle has no angle: the mean angle is over the others, and says how many.
+/// A result without a triangle has no angle: the mean angle is over the others, with their number.
 #[test]
 fn missing_values_are_excluded_from_means() {
     let mut records = vec![];
