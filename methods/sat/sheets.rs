@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn perturbation_is_as_large_as_said_and_seeded() {
+    fn perturbation_has_its_size_and_is_seeded() {
         let balls: Vec<Sphere> =
             (1..100).map(|k| Sphere::new(Vec3::splat(f64::from(k)), f64::from(k))).collect();
         let SatParams { radius_factor, jitter, .. } = SatParams::default();
