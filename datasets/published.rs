@@ -48,7 +48,7 @@ pub struct Package {
 pub enum Set {
     /// For comparisons: bounds a solid, has no self-intersection and at least [`MIN_PUBLIC_VERTICES`].
     Public,
-    /// Refused when read, or repaired.
+    /// Rejected when read, or repaired.
     Defective,
     /// As `Public`, with fewer vertices.
     Small,

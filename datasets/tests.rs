@@ -1,4 +1,4 @@
-//! Every shape against an analytic depth function of its own: nothing shared with the generators.
+//! Every shape against a separate analytic depth function: nothing shared with the generators.
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, Sphere, betti};
