@@ -160,7 +160,7 @@ impl Filter {
         }
     }
 
-    /// The determinant of the power test in double precision, and a bound on its error beside
+    /// The determinant of the power test in double precision, and a bound on its error except
     /// [`UNDERFLOW`].
     #[inline(always)]
     pub(crate) fn lifted_determinant<M: Metric>(cell: [&Site; 4], e: &Site) -> (f64, f64) {
@@ -350,10 +350,10 @@ impl Real for Pair {
 // site, the larger its growth. If the test is zero, its perturbed sign is that of the first non-zero
 // cofactor, from the largest of the five sites downwards. The cofactor of a vertex is the
 // orientation of the cell with that vertex replaced by the query. The query's own cofactor is the
-// orientation of the cell, which is never zero, so there always is an answer.
+// orientation of the cell, which is never zero, so there always is a result.
 //
 // Orientation is never perturbed, hence no cell is flat. The result is the regular triangulation of
-// infinitesimally different weights: unique, whatever the order of insertion.
+// infinitesimally different weights: unique for any order of insertion.
 
 /// Whether `e` is in conflict with the positively oriented cell: inside its perturbed orthosphere.
 ///
