@@ -45,7 +45,7 @@ pub fn write_atomically(
     written
 }
 
-/// Removes the temporary files of writes in progress: what a process does that ends itself without
+/// Removes the temporary files of writes in progress: for a process that ends itself without
 /// unwinding, since no destructor runs then.
 pub fn remove_temporaries() {
     live(|paths| {

@@ -52,7 +52,7 @@ pub use atomic::{remove_temporaries, write_atomically};
 pub use colour::{ColourMap, decode_srgb};
 
 pub use geometry::Vec3;
-/// Triangulations, dual complexes, box trees, distances to sphere, cone and slab: a crate of its own.
+/// Triangulations, dual complexes, box trees, distances to sphere, cone and slab: a separate crate.
 pub use medial_geometry as geometry;
 // For the code that `parameters!` generates.
 #[doc(hidden)]

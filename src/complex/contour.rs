@@ -10,7 +10,7 @@
 //! 3. Edges shorter than a quarter of the tetrahedron's edge are contracted: a closed manifold stays one,
 //!    and vertices stay on the boundary ([`contract_short_edges`]).
 //!
-//! # What the tolerance means
+//! # The tolerance
 //!
 //! Every point with `sigma > tolerance` is outside the surface, and every point with
 //! `sigma < -tolerance` is inside. Proof: let `d` be the longest edge of the tetrahedron that holds the
@@ -104,7 +104,7 @@ const MIN_SHARE_OF_CELL: f64 = 1.0 / 16.0;
 const MAX_TETRAHEDRA: usize = 50_000_000;
 
 /// The boundary of the union of all primitives of a medial mesh as triangles. `tolerance` is in the unit of
-/// the mesh; the head of this file says what it means.
+/// the mesh; the head of this file defines it.
 ///
 /// The time and memory grow with the area of the boundary over the square of the tolerance. Parallel;
 /// the same surface for any number of threads.
@@ -473,8 +473,8 @@ impl Bisection {
     }
 
     /// Bisects until no tetrahedron is wanted and all are conforming. `values` gives the values at
-    /// new vertices, `goal` is the generation that is wanted everywhere at the boundary. `go_on` is asked
-    /// in every round, and every so many vertices.
+    /// new vertices, `goal` is the generation that is wanted everywhere at the boundary. `go_on` is called
+    /// in every round, for every [`CHUNK`] of vertices.
     ///
     /// # Errors
     /// When there are more than `most` tetrahedra, or will be by far: near a surface, three bisections

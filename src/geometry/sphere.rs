@@ -67,8 +67,8 @@ impl<const N: usize> HullFoot<N> {
     ) -> Self {
         let arm = p - sphere.centre;
         let distance = arm.length();
-        let tells = distance > 0.0 && distance > SHORT_ARM * sphere.radius;
-        Self::along(sphere, weights, p, if tells { arm / distance } else { apart() })
+        let is_long = distance > 0.0 && distance > SHORT_ARM * sphere.radius;
+        Self::along(sphere, weights, p, if is_long { arm / distance } else { apart() })
     }
 
     /// The foot of `p` in a known direction from the centre.
