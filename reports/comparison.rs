@@ -208,7 +208,7 @@ pub(crate) fn rises((spheres, error): (f64, f64), results: &[(f64, f64)]) -> boo
     results.iter().any(|&(fewer, least)| fewer < spheres && error > (1.0 + RISE) * least)
 }
 
-/// The records that count: of one mesh, row and level the last one, whatever build made it. Records
+/// The records that count: of one mesh, row and level the last one, of any build. Records
 /// of an older build stay where the newer one has none.
 fn latest_records<'a>(records: &'a [Record], hashes: &Hashes<'a>) -> Vec<&'a Record> {
     let mut last = BTreeMap::new(); // by item, the index of its last record
@@ -306,7 +306,7 @@ impl<'a> SeriesKey<'a> {
             .map(|(key, value)| format!("{key}={}", value.trim_matches('"')))
             .collect();
         let conditions = record.conditions.as_ref();
-        // The files of one external method are one row, whatever their paths and hashes.
+        // The files of one external method are one row for all paths and hashes.
         let is_external = record.status == Status::External;
         Self {
             method: &simplify.method,

@@ -74,7 +74,7 @@ pub struct MethodNote {
     /// One sentence on what the method is best suited for; may be empty.
     #[serde(default)]
     pub home: String,
-    /// What the published level means.
+    /// Meaning of the published level.
     pub published: String,
     /// Name and unit of the method's own level, where it has one.
     #[serde(default)]

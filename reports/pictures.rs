@@ -63,7 +63,7 @@ pub(crate) fn strips(comparison: &Comparison<'_>) -> BTreeMap<usize, PictureStri
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
     for (mesh, name) in comparison.meshes.iter().enumerate() {
         let mut shown: Vec<(f64, &Entry<'_>)> = (comparison.of_mesh(mesh))
-            // A file of another program has one number of spheres, whatever that is.
+            // A file of another program has one number of spheres, of any size.
             .filter(|entry| entry.level == level || entry.record.status == Status::External)
             .filter(|entry| entry.measured() && entry.record.artifact.is_some())
             .filter_map(|entry| Some((HAUSDORFF.of(entry.record)?, entry))) // a caption names it

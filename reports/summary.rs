@@ -38,7 +38,7 @@ pub(crate) struct SeriesSummary {
     pub(crate) over: usize,
     /// Meshes that the method ran on.
     pub(crate) requested: usize,
-    /// Meshes without such a result, by what became of them.
+    /// Meshes without such a result, by status.
     pub(crate) without: BTreeMap<Status, usize>,
     /// Means of [`COMPARED`] by their keys, and the number of meshes that each is over.
     means: BTreeMap<&'static str, (f64, usize)>,

@@ -6,7 +6,7 @@
 //! | bytes | what |
 //! |---|---|
 //! | 4 | length of the head, little-endian as all that follows |
-//! | head | JSON, what the arrays mean; filled up with spaces to a multiple of four |
+//! | head | JSON, the meaning of the arrays; filled up with spaces to a multiple of four |
 //! | `u32` | faces of the surface, three vertices each, as differences from the number before |
 //! | for each result | spheres, four `f32` each; edges, two `u32` each; faces, three `u32` each |
 //! | `u16` | vertices of the surface, in steps from the lowest corner |

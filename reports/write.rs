@@ -202,7 +202,7 @@ impl ReportError {
     }
 }
 
-/// The folder of the report and what was written there.
+/// The folder of the report and the written files.
 struct Files<'a> {
     dir: &'a Path,
     written: Vec<PathBuf>,
@@ -248,7 +248,7 @@ impl Files<'_> {
         self.write(&format!("tables/{stem}.tex"), latex.as_bytes())
     }
 
-    /// Removes what an earlier report left under the names that only a report gives.
+    /// Removes files of an earlier report, by names that only a report gives.
     /// The pictures and views that are `shown` stay.
     fn remove_stale(&self, shown: &[PathBuf]) -> Result<(), ReportError> {
         for folder in ["tables", "plots", FOLDER, VIEWS] {

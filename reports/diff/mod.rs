@@ -1,4 +1,4 @@
-//! Two sets of records of one study, an older and a newer one: what became worse, better, or merely different.
+//! Two sets of records of one study, an older and a newer one: regressions, improvements and other changes.
 //!
 //! 1. **Pairs** (`results`): records of one mesh, row, level and seed, measured under the same settings. Records
 //!    without a partner or with other settings are listed with the reason.

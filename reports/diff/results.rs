@@ -1,4 +1,4 @@
-//! Results of both sets: which record of one belongs to which of the other, and what differs between them.
+//! Results of both sets: pairs of records, and their differences.
 //!
 //! The same input always gives the same result, so that any difference is one of the program and needs no statistics.
 

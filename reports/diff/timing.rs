@@ -37,10 +37,10 @@ const ERROR_RATE: f64 = 0.01;
 /// Share of the repetitions that have to agree.
 const AGREEMENT: f64 = 0.9;
 
-/// Shorter times are not compared: they are of the size of what the clock and the caches do.
+/// Shorter times are not compared: they are of the size of effects of clock and caches.
 const LEAST_SECONDS: f64 = 2e-3;
 
-/// The row of what methods share.
+/// The row of the shared substrates.
 const SUBSTRATES: &str = "(substrates)";
 
 /// How the seconds of a method changed.

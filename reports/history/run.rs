@@ -1,4 +1,4 @@
-//! The file of one run: what one build measured in one study on one machine.
+//! The file of one run: the measurements of one build in one study on one machine.
 //!
 //! A run is `DATE-COMMIT.json` in the folder of the history. It is written once. A damaged file is reported, left out,
 //! and never replaced.
@@ -27,7 +27,7 @@ impl HistoryError {
     }
 }
 
-/// What one build measured in one study.
+/// The measurements of one build in one study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {
     /// Date of the commit, ISO 8601. Runs are sorted by it.

@@ -190,7 +190,7 @@ const viewOf = (() => {
       }
       return [coloured(soup), balls(result, () => 2.4 * thin), glass()];
     };
-    // The union: what primitives hide of each other, the depth buffer hides.
+    // The union: the depth buffer removes hidden parts of primitives.
     const union = (result) => {
       const soup = new Soup();
       const sides = sidesOf(result);
@@ -234,7 +234,7 @@ const viewOf = (() => {
   ];
   const percent = (value) => `${Number(value.toPrecision(2))} %`;
 
-  // One camera for both sides. What the picture must hold in the first view decides its width.
+  // One camera for both sides. The content of the first view decides its width.
   const cameraOf = (T, view) => {
     const camera = new T.OrthographicCamera();
     const direction = new T.Vector3(...view.direction).normalize();

@@ -1,4 +1,4 @@
-//! The scene: what can be drawn, and the facets that it becomes.
+//! The scene: drawable layers, and their facets.
 
 use medial::complex::{MedialMesh, Sphere};
 use medial::geometry::DisjointSets;
@@ -30,7 +30,7 @@ pub enum Layer<'a> {
     Surface(&'a TriMesh),
     /// A closed surface as faint glass: its rims and its sharp edges, with the inside visible.
     Glass(&'a TriMesh),
-    /// A closed surface as glass where nothing else is: what a reconstruction lacks.
+    /// A closed surface as glass where nothing else is: the missing parts of a reconstruction.
     Ghost(&'a TriMesh),
     /// A surface coloured by a value at each vertex.
     Values {
@@ -188,7 +188,7 @@ impl Layer<'_> {
                 (surface_facets(mesh, |_, _| 0.5), look)
             }
             Self::Glass(mesh) | Self::Ghost(mesh) => {
-                // Rims are more opaque: what varies along a facet is how much it faces the eye.
+                // Rims are more opaque: the values of a facet are how much it faces the eye.
                 let facing = |_, normal| canvas.frame.back.dot(normal).abs() as f32;
                 let kind = if matches!(self, Self::Ghost(_)) { Kind::Ghost } else { Kind::Glass };
                 let paint = Paint::plain([0.0; 3]);

@@ -89,10 +89,10 @@ pub struct Panel<'a> {
     pub errors: Option<Errors<'a>>,
 }
 
-/// What the panels of a strip have in common.
+/// Shared settings of the panels of a strip.
 #[derive(Clone, Debug)]
 pub struct Strip<'a> {
-    /// The surface that the medial meshes are of: drawn as glass around them, and what the camera is set up by.
+    /// The surface that the medial meshes are of: drawn as glass around them; it sets up the camera.
     pub surface: &'a TriMesh,
     /// Bounding-box diagonal of the surface, of which bars show percentages.
     pub diagonal: f64,
@@ -114,7 +114,7 @@ pub struct Strip<'a> {
 const MOST_PIXELS_OF_ALL: usize = 1 << 27;
 
 /// Medial meshes next to each other: one panel each, its caption below. If any panel has errors, a second row shows the
-/// reconstructions coloured by error, with what they lack as glass. Colours are on one scale along a row, which a bar at
+/// reconstructions coloured by error, with missing parts as glass. Colours are on one scale along a row, which a bar at
 /// its end shows.
 ///
 /// # Errors

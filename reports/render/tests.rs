@@ -63,7 +63,7 @@ fn a_sphere_is_a_disc() {
     assert_eq!(picture.pixel(120, 100).map(|pixel| pixel[3]), Some(255));
 }
 
-/// What faces the eye is lit by the lamp at the viewer's shoulder alone.
+/// Facets that face the eye are lit only by the lamp at the viewer's shoulder.
 #[test]
 fn the_middle_of_a_sphere_has_the_light_of_the_lamp() {
     let mesh = sphere(1.0, 48);

@@ -179,7 +179,7 @@ fn add(name: String, value: &Value, row: &mut BTreeMap<String, String>) {
     row.insert(name, inert(text));
 }
 
-/// Text that a spreadsheet shows and does not run: a quote goes before what would begin a formula.
+/// Text that a spreadsheet shows and does not run: a quote goes before the first character of a formula.
 /// Numbers may begin so and stay as they are.
 fn inert(cell: String) -> String {
     let formula = cell.starts_with(['=', '+', '-', '@', '\t', '\r']);

@@ -216,7 +216,7 @@ fn markdown_line(cells: impl Iterator<Item = String>) -> String {
     format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
 }
 
-/// Escapes what Markdown or the HTML inside it would take for markup.
+/// Escapes the markup of Markdown and of the HTML inside it.
 pub(crate) fn escape(text: &str) -> String {
     let text = printable(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let is_markup = |c| "|\\`*_[]#~$".contains(c);

@@ -15,10 +15,10 @@ use medial_reports::{Record, View3d, picture_strips, write_report};
 use serde_json::{Value, json};
 
 const BROWSER: &str = "chromium";
-/// More rows than stand in the document at first.
+/// More rows than the document has at first.
 const METHODS: [&str; 6] = ["qmat", "angle", "lambda", "sat", "hem", "pmat"];
 const COUNTS: [usize; 4] = [1000, 500, 200, 100];
-/// What takes longer has failed.
+/// Limit of each wait.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A browser without a window, controlled through a pipe by its DevTools protocol.
@@ -127,7 +127,7 @@ impl Browser {
         self.until(
             "location.protocol === 'file:' && 'ready' in (document.documentElement?.dataset ?? {})",
         );
-        // What moves on its own moves from under the mouse.
+        // Animated elements would move from under the mouse.
         self.value("document.documentElement.style.scrollBehavior = 'auto'");
     }
 

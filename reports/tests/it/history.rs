@@ -55,7 +55,7 @@ fn runs_are_stored_once_and_read_back_in_order() {
             *record = failed("box", "hem", 500, Status::TimedOut, "no result within 300 s");
         }
     });
-    // The second run of a day sorts by its time, whatever its commit.
+    // The second run of a day sorts by its time, for any commit.
     runs[2].date = date(1).replace("02:15", "01:15");
     for run in &runs {
         assert!(run.add_to(folder.path()).expect("added").1);
