@@ -323,7 +323,7 @@ impl<'s> ByKnob<'s> {
         Self { prepare: Box::new(prepare), search, native }
     }
 
-    /// By the number of samples of a shape. Builds what all samplings share, the tree and the inside
+    /// By the number of samples of a shape. Builds the parts that all samplings share, the tree and the inside
     /// test of the surface, so that they count as substrates.
     ///
     /// # Errors

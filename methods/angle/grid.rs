@@ -324,7 +324,7 @@ impl Simplification for Faces {
 /// Finest lattice of a search: eight million voxels for a cube.
 const FINEST: f64 = 200.0;
 
-/// The shape on lattices of any resolution. Builds what all of them share, the tree and the inside
+/// The shape on lattices of any resolution. Builds their shared parts, the tree and the inside
 /// test of the surface.
 pub(super) fn prepare_by_resolution<'s>(
     shape: &'s Shape,

@@ -25,7 +25,7 @@ const NO_ANCHOR: u32 = u32::MAX;
 /// A distance that orders by its value: none is negative, so that the bits ascend with it.
 type Length = u64;
 
-/// The complex of the spheres chosen, in their order. `anchors` are the vertices where they stand, each once.
+/// The complex of the spheres chosen, in their order. `anchors` are their vertices, each once.
 ///
 /// # Errors
 /// When a sphere is not valid.

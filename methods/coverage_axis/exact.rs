@@ -32,11 +32,11 @@ pub(super) struct Cover {
     pub nodes: usize,
     /// Samples that no candidate covers.
     pub uncoverable: usize,
-    /// What ended the search.
+    /// The end of the search.
     pub end: End,
 }
 
-/// What ends a search for a smallest cover.
+/// The end of a search for a smallest cover.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum End {
     /// The solver: nothing better is left, but for its rounding.

@@ -204,7 +204,7 @@ fn a_cylinder_takes_as_many_as_their_rings_are_wide() {
         let cover = exact_cover(&Coverage::new(&samples, &balls, delta));
         let found = cover.chosen.len();
         assert_eq!(cover.bound, found);
-        // Samples are fewer than points, and candidates stand on a grid: one more or less.
+        // Samples are fewer than points, and candidates are on a grid: one more or less.
         assert!(found.abs_diff(fewest) <= 1, "{delta}: {found} for {fewest}");
     }
 }

@@ -187,7 +187,7 @@ impl Contraction {
         self.edges.insert(ends, edge);
     }
 
-    /// Tests the topology for the edge and the inversion for each direction; bars what fails.
+    /// Tests the topology for the edge and the inversion for each direction; bars those that fail.
     fn bar(&mut self, ends: [u32; 2], edge: &mut Edge) {
         let [a, b] = ends;
         edge.tested = true;

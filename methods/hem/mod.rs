@@ -133,7 +133,7 @@ const PUBLISHED: f64 = 1e-4;
 
 /// The HEM simplifier.
 ///
-/// Answers [`Level::Spheres`], and [`Level::Native`] with a bound that holds for every sample
+/// Supports [`Level::Spheres`], and [`Level::Native`] with a bound that holds for every sample
 /// against the whole union: one-sided, unless the parameter `sides` selects both directions. A
 /// request finer than the one before starts again from the initial mesh.
 ///

@@ -18,7 +18,7 @@ use super::{Inside, SampleLists, *};
 
 const READINGS: [Inside; 2] = [Inside::Depth, Inside::Surface];
 
-/// More than the distances can be rounded, and than what counts as no error.
+/// More than the rounding of distances, and than errors that count as zero.
 const CLOSE: f64 = 3e-12;
 
 /// The parts of a random model; simplices and lists with repetitions.

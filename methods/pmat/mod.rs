@@ -384,7 +384,7 @@ impl Graph {
             self.nodes[v as usize].met_by = removed;
         }
         self.nodes[removed as usize].parent = kept;
-        // The remaining neighbours overwrite what was read: writing never overtakes reading.
+        // The remaining neighbours overwrite read entries: writing never overtakes reading.
         let (mut target, mut written) = (removed, 0);
         let mut source = removed;
         while source != NONE {

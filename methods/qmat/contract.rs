@@ -66,7 +66,7 @@ impl Kept {
     }
 }
 
-/// Counts of what happened to popped candidates.
+/// Counts of popped candidates by outcome.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Tally {
     collapses: usize,
@@ -208,7 +208,7 @@ impl Contraction {
         run.step(total, total)
     }
 
-    /// Steps 3 and 4: where the merged sphere goes, or what holds the edge back.
+    /// Steps 3 and 4: the place of the merged sphere, or the reason against the edge.
     fn decide(&mut self, candidate: Candidate) -> Decision {
         let [a, b] = candidate.ends();
         if self.keeps_topology() && !self.complex.keeps_homotopy(a, b) {

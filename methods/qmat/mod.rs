@@ -37,7 +37,7 @@
 //!
 //! - The topology is kept from the first collapse on (`topology_from=all`, the meaning of `auto` at
 //!   every level but the published one). The paper checks only once `η = 200` spheres are left, which
-//!   saves time but leaves what earlier collapses broke. With
+//!   saves time but leaves the defects of earlier collapses. With
 //!   `topology_from=200` the results of 1,000 spheres have wrong Betti numbers on seven of the twelve
 //!   shared meshes; with checks from the start, on none whose initial mesh has the right ones.
 //!   [`Level::Published`] checks from 200 spheres on by default.
@@ -83,7 +83,7 @@ const PUBLISHED: usize = 100;
 
 /// The Q-MAT simplifier.
 ///
-/// Answers [`Level::Spheres`]; a request finer than the one before starts again. Cost
+/// Supports [`Level::Spheres`]; a request finer than the one before starts again. Cost
 /// `O(n log n)` for an initial mesh of bounded degree.
 pub fn method() -> Method<QmatParams> {
     let info = MethodInfo::new("qmat", "Q-MAT")

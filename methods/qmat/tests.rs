@@ -227,7 +227,7 @@ fn follow(mesh: &MedialMesh, params: QmatParams) -> [usize; 3] {
         let complex = &contraction.complex;
         assert_eq!([complex.edge_count(), complex.face_count()], oracle.sizes());
     }
-    // Nothing is left but what only Betti numbers allow.
+    // Only edges that Betti numbers alone allow are left.
     let (left, unlocked) = (contraction.complex.sphere_count(), contraction.tally.unlocked);
     contraction.run_to(mesh, 1, &RunContext::default()).unwrap();
     assert!(contraction.complex.sphere_count() == left || contraction.tally.unlocked > unlocked);
@@ -333,7 +333,7 @@ proptest! {
 // ----------------------------------------------------------------------------
 // Q-MAT as the paper writes it, with sets, full matrices and no queue: the oracle of the tests.
 //
-// Every step prices what changed, tries all edges in order and takes the first that may be
+// Every step prices the changes, tries all edges in order and takes the first that may be
 // collapsed. It shares with the method the link condition, tested by a separate oracle, and the documented rules
 // outside the paper: ties, and the replacement of a minimiser.
 

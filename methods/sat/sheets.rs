@@ -185,7 +185,7 @@ mod tests {
                 faces = mesh.faces.len();
                 removed_in_all += removed;
                 if limit == 90.0 {
-                    // Only what closes up or is a right angle is left.
+                    // Only closed sheets and right angles are left.
                     let open = Incidence::of(&mesh).faces_at().iter().filter(|&&n| n == 1).count();
                     assert_eq!(open, 0);
                 }

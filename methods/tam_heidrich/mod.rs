@@ -27,7 +27,7 @@
 //! removed. So results of fewer spheres are always contained in those of more, and a part is the smallest
 //! step. The diagnostics name the count on the other side of the number.
 //!
-//! # What does not reproduce
+//! # Results that do not reproduce
 //! - On an exact axis of a box there are twelve parts of level 1 and one of level 2, as in figure 5, and
 //!   so there are on a box that is sampled on a grid (the built-in one): 161 parts at first, these 13
 //!   after one round by triangle count. On the same box with 3,000 samples of blue noise there are not:

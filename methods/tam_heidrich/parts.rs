@@ -93,7 +93,7 @@ impl<'a> Remaining<'a> {
     }
 }
 
-/// The parts of what remained when it was decomposed, by their smallest triangle.
+/// The parts of the remaining complex when it was decomposed, by their smallest triangle.
 pub(super) struct Parts {
     /// The triangles of part `p` are `faces[start[p]..start[p + 1]]`, ascending.
     start: Vec<usize>,
@@ -132,7 +132,7 @@ impl Shared {
 const NOT_SEEN: u32 = u32::MAX;
 
 impl Parts {
-    /// Decomposes what remains. Nearly linear.
+    /// Decomposes the remaining complex. Nearly linear.
     pub(super) fn of(remaining: &Remaining<'_>) -> Self {
         let axis = remaining.axis;
         let (start, faces) = grown(remaining);

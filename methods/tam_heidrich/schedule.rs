@@ -24,7 +24,7 @@ pub(super) enum Measure {
 /// Pruning in progress.
 pub(super) struct Pruning<'a> {
     pub(super) remaining: Remaining<'a>,
-    /// The decomposition of what remains.
+    /// The decomposition of the remaining complex.
     pub(super) parts: Parts,
     pub(super) diagnostics: Diagnostics,
     run: &'a RunContext,

@@ -347,7 +347,7 @@ impl<'a> Stars<'a> {
     }
 }
 
-/// What surrounds an edge once it is collapsed.
+/// The surroundings of an edge once it is collapsed.
 struct Ring {
     neighbours: Vec<Sphere>,
     sides: Vec<[Sphere; 2]>,

@@ -125,7 +125,7 @@ impl Goal {
         let samples = spread.into_iter().map(|point| Sample { point, weight: 1.0 });
         let stride = (pool.len() / INTERIOR).max(1);
         let interior = pool.iter().step_by(stride).copied().collect();
-        // Along a curve: what serves a sample mostly serves the next one.
+        // Along a curve: the primitive of a sample mostly serves the next one.
         let samples: Vec<Sample> = samples.chain(vertices).collect();
         let places: Vec<Vec3> = samples.iter().map(|sample| sample.point).collect();
         let samples = morton_order(&places).into_iter().map(|(_, i)| samples[i as usize]).collect();
@@ -449,7 +449,7 @@ pub(super) fn places(mesh: &MedialMesh, share: f64) -> Vec<Held> {
 }
 
 /// The residuals of a medial mesh. Another one that stays is at the distance `limits` from each sample, or
-/// there is none. `near` is what served each sample when the spheres were a little elsewhere, if that is
+/// there is none. `near` is the primitive of each sample when the spheres were a little elsewhere, if that is
 /// known. Balls that protrude by no more than `tolerance` are left out.
 ///
 /// # Errors
@@ -467,7 +467,7 @@ pub(super) fn residuals(
     let surface = points.samples.iter().map(|sample| sample.point);
     let places: Vec<Vec3> = surface.chain(points.interior.iter().map(|x| x.point)).collect();
     let count = points.samples.len();
-    // What holds an interior point deeply enough holds it: no deeper primitive is looked for.
+    // A primitive that holds an interior point deeply enough is accepted: no deeper one is searched.
     let nearest = union.deepest_batch_near(&places, near, |i| {
         i.checked_sub(count).map(|i| held_from(points.interior[i].depth))
     });

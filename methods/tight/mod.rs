@@ -96,9 +96,9 @@ pub struct Tight {
     starter: Arc<dyn MedialSimplifier>,
 }
 
-/// The `tight` simplifier, starting from what `starter` leaves.
+/// The `tight` simplifier, starting from the result of `starter`.
 ///
-/// Answers [`Level::Spheres`] up to a few thousand, at the cost of some hundred evaluations of all samples, and
+/// Supports [`Level::Spheres`] up to a few thousand, at the cost of some hundred evaluations of all samples, and
 /// [`Level::Native`], a bound of the two-sided error, at several times that.
 pub fn method(starter: impl MedialSimplifier + 'static) -> Tight {
     let info = MethodInfo::new("tight", "Tight")

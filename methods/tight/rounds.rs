@@ -190,7 +190,7 @@ impl Polish<'_> {
         Ok(helped)
     }
 
-    /// A little below the error counts as one, so that what exceeds it weighs heavily.
+    /// A little below the error counts as one, so that larger ones weigh heavily.
     fn objective(&self, power: f64, error: f64) -> Objective {
         Objective { power, mean: self.params.lambda, scale: 0.9 * error }
     }
@@ -271,7 +271,7 @@ pub(super) const LEAST_RADIUS: f64 = 1e-5;
 /// Damping before the first step, a share of the diagonal.
 const FIRST_DAMPING: f64 = 1e-2;
 
-/// What holds a fixed sphere, times the mean of the diagonal.
+/// Stiffness of a fixed sphere, times the mean of the diagonal.
 const STIFF: f64 = 1e12;
 
 /// Steps that are refused one after the other before the descent ends.

@@ -249,7 +249,7 @@ medial::parameters! {
         /// Weight of the Euclidean part of the energy, above 0 and at most 1; with a small one,
         /// spheres reach into features.
         lambda: f64 = 0.2, "pure number";
-        /// The refit minimises what both published programs do (lambda squared, plane distances summed
+        /// The refit minimises the objective of both published programs (lambda squared, plane distances summed
         /// before they are squared), or the energy as written.
         refit: Refit = Refit::Published, "published or energy";
         /// A shrinking ball touches surface points, or the mesh: exact, but slower.

@@ -228,13 +228,13 @@ impl System {
 }
 
 // ----------------------------------------------------------------------------
-// What the refit minimises: the energy, or the objective of the published programs.
+// The objective of the refit: the energy, or the objective of the published programs.
 
 /// The residuals of all points.
 pub(super) enum Residuals {
     /// The energy as written.
     Energy(Energy),
-    /// What both programs minimise: for each point one residual, a weighted sum of distances to planes, and
+    /// The objective of both programs: for each point one residual, a weighted sum of distances to planes, and
     /// the Euclidean one with the square of `lambda`.
     Published { sums: Vec<PlaneSum>, energy: Energy },
 }

@@ -42,7 +42,7 @@ pub(super) struct VariationalSampling<'a> {
     pub tally: Tally,
 }
 
-/// What happened on the way.
+/// Counts of events in the iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Tally {
     pub iterations: usize,

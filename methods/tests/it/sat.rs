@@ -1,4 +1,4 @@
-//! SAT on sampled solids: what scale 1 leaves, the scale at which a gap closes, real meshes.
+//! SAT on sampled solids: the result of scale 1, the scale at which a gap closes, real meshes.
 
 use std::f64::consts::{PI, TAU};
 
