@@ -65,7 +65,7 @@ const ORIENTATION_BOUND: f64 = 8.5 * U;
 const IN_SPHERE_BOUND: f64 = 216.0 * U;
 /// 17 roundings of the determinant, and as many of the permanent.
 const PERMANENT_BOUND: f64 = 17.5 * U;
-/// What underflow takes from an orientation at most, with room to spare.
+/// Largest error of an orientation by underflow, with a margin.
 const ORIENTATION_UNDERFLOW: f64 = 1e-260;
 /// The same for the in-sphere test and the power test.
 pub(crate) const UNDERFLOW: f64 = 1e-145;
@@ -150,7 +150,7 @@ impl Filter {
         self.resolve::<M>(det, bound, cell, e)
     }
 
-    /// The sign of the power test from what [`Filter::lifted_determinant`] returned.
+    /// The sign of the power test from the result of [`Filter::lifted_determinant`].
     #[inline(always)]
     fn resolve<M: Metric>(self, det: f64, bound: f64, cell: [&Site; 4], e: &Site) -> Sign {
         if det.abs() > bound + UNDERFLOW || bound <= self.exact_power {
