@@ -13,7 +13,7 @@ const SMALL: usize = 2000;
 
 fn surface(bytes: &[u8], format: Format) {
     let Ok(loaded) = surface::read_bytes(bytes, format) else { return };
-    // What reading guarantees is what checking demands.
+    // Reading guarantees all that checking demands.
     let checked = surface::validate(&loaded.mesh).expect("a surface that was read is valid");
     assert_eq!(checked.faces, loaded.mesh.faces.len());
 }

@@ -9,7 +9,7 @@
 //! | [`complex`] | the medial mesh, its formats, its topology, the edge-collapse engine |
 //! | [`metrics`] | Hausdorff distances, triangle quality, spikes, topology against the solid's own |
 //! | [`shape`] | one normalised input with its substrates, each built once, on demand, and timed |
-//! | [`simplifier`] | the trait [`simplifier::MedialSimplifier`] and what goes in and out of it |
+//! | [`simplifier`] | the trait [`simplifier::MedialSimplifier`] with its inputs and outputs |
 //!
 //! Lengths are in units of the input's bounding-box diagonal wherever a [`shape::Shape`] is
 //! involved, and in the unit of the arguments everywhere else.

@@ -243,7 +243,7 @@ where
 
 // The context of a run, and its errors.
 
-/// What surrounds a run: seed, cancellation, progress. The number of threads is that of the
+/// The context of a run: seed, cancellation, progress. The number of threads is that of the
 /// rayon pool in which the method is called.
 #[derive(Clone, Default)]
 pub struct RunContext {
@@ -478,7 +478,7 @@ impl Simplification for Started {
     }
 }
 
-// What only some methods give, kept by type.
+// Results of some methods only, stored by type.
 
 /// Results of a method besides the medial mesh: at most one value of each type.
 ///

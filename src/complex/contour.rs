@@ -43,7 +43,7 @@ pub struct UnionSurface {
     pub mesh: TriMesh,
     /// Tetrahedra that were needed.
     pub tetrahedra: usize,
-    /// Spheres with a radius below the smallest tetrahedron: these, and what tapers to them, may be
+    /// Spheres with a radius below the smallest tetrahedron: these, and parts that taper to them, may be
     /// missing.
     pub lost: usize,
     /// Radius below which a sphere counts as lost, in the unit of the mesh.
@@ -57,12 +57,11 @@ pub enum ContourError {
     #[error(transparent)]
     Union(#[from] UnionError),
     /// The tolerance is not a positive number.
-    #[error("a tolerance of {0} is not positive")]
+    #[error("tolerance {0}: not positive")]
     Tolerance(f64),
     /// The tolerance is too fine for the memory that this may take.
     #[error(
-        "a tolerance of {tolerance:e} needs more than {most} tetrahedra, or finer ones than there are; \
-         {feasible:e} is feasible"
+        "tolerance {tolerance:e}: needs more than {most} tetrahedra, or too fine ones; {feasible:e} is feasible"
     )]
     TooFine {
         /// The requested tolerance, in the unit of the mesh.
@@ -73,9 +72,7 @@ pub enum ContourError {
         feasible: f64,
     },
     /// No part of the union is thick enough.
-    #[error(
-        "no part of the union is as thick as {smallest:e}: a tolerance below {feasible:e} shows some"
-    )]
+    #[error("no part of the union is as thick as {smallest:e}; use a tolerance below {feasible:e}")]
     TooThin {
         /// The smallest tetrahedron.
         smallest: f64,

@@ -6,7 +6,7 @@
 //! - (a) the largest `|sigma(p)|` over the points `p` of S, and
 //! - (b) the largest distance to S over the points of the boundary of U.
 //!
-//! These are what [`Distances`](super::Distances) samples as `epsilon_union` and `reverse`. Outside
+//! [`Distances`](super::Distances) samples these as `epsilon_union` and `reverse`. Outside
 //! U, `sigma` is the distance to U; inside, `-sigma` is the depth in the deepest single
 //! primitive, which is less than the depth in U where primitives cover each other.
 //!

@@ -35,7 +35,7 @@ pub const RATIO_THRESHOLDS: [f64; 3] = [0.05, 0.1, 0.2];
 /// Largest protrusion of an idle sphere, as a fraction of the bounding-box diagonal.
 pub const IDLE_PROTRUSION: f64 = 1e-3;
 /// Radii that differ by less count as equal, as a fraction of the bounding-box diagonal. Otherwise
-/// rounding would decide about plates and tubes, whose radii are all the same.
+/// rounding would decide about plates and tubes, whose radii are equal.
 pub const EQUAL_RADII: f64 = 1e-9;
 /// Smallest angle of a fin, in degrees.
 pub const FIN_ANGLE: f64 = 10.0;

@@ -43,7 +43,7 @@ pub struct MethodInfo {
     /// Whether there is one result for each shape, at [`Level::Published`](crate::simplifier::Level::Published)
     /// alone.
     pub fixed: bool,
-    /// What [`Level::Published`](crate::simplifier::Level::Published) means here.
+    /// Meaning of [`Level::Published`](crate::simplifier::Level::Published) here.
     pub published: Text,
     /// Parameters, in the order of the paper.
     pub params: Vec<ParamInfo>,

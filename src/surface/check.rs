@@ -93,7 +93,7 @@ pub(super) fn examine_unrepaired(mesh: &TriMesh) -> Result<SurfaceReport, Fault>
     Ok(report)
 }
 
-/// Checks what repairs guarantee for files: finite coordinates, valid and distinct corners, no
+/// Checks the guarantees of repairs for files: finite coordinates, valid and distinct corners, no
 /// repeated face, no vertex without a face.
 fn check_indices(mesh: &TriMesh) -> Result<(), Fault> {
     let vertices = mesh.vertices.len();

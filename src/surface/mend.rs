@@ -265,7 +265,7 @@ struct Best {
     normal: Vec3,
 }
 
-/// A loop with what surrounds it.
+/// A loop with its surroundings.
 struct Patch<'a> {
     corners: &'a [u32],
     /// Positions of the corners, in a unit in which nothing overflows.

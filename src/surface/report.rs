@@ -56,7 +56,7 @@ impl fmt::Display for Place {
 /// A place in front of a sentence that names the element itself.
 fn before(at: &Place) -> String {
     match at {
-        // In a binary file the place is the element: it would stand in the message twice.
+        // In a binary file the place is the element: it would be in the message twice.
         Place::Element(..) => String::new(),
         place => format!("{place}: "),
     }
@@ -145,7 +145,7 @@ pub enum Fault {
     )]
     Open { edges: usize, first: [VertexName; 2] },
     /// A hole that is too long to be filled.
-    #[error("the hole at {first} has {edges} edges, and holes of up to {most} are filled")]
+    #[error("the hole at {first}: too long to fill (found {edges} edges, expected at most {most})")]
     LongHole { edges: usize, most: usize, first: VertexName },
     /// A hole that no triangles close.
     #[error(

@@ -242,7 +242,7 @@ pub(super) fn turn_over(faces: &mut [[u32; 3]], marked: impl Iterator<Item = boo
     }
 }
 
-/// What turning faces amounts to: `turned` marks faces that disagreed with the first face of
+/// The effect of turning faces: `turned` marks faces that disagreed with the first face of
 /// their component, `wrong` the components that were turned as a whole afterwards.
 pub(super) fn repairs(
     turned: &[bool],

@@ -31,7 +31,7 @@ fn good_meshes_match_the_manifest() {
         assert!((r.diagonal / diagonal - 1.0).abs() < 1e-5, "{}", row["file"]);
         assert!(r.repairs.is_empty() && r.warnings.is_empty(), "{}: {r:?}", row["file"]);
         assert!(r.volume.unwrap() > 0.0);
-        // What reading guarantees is what checking demands.
+        // Reading guarantees all that checking demands.
         let checked = surface::validate(&loaded.mesh).unwrap();
         assert_eq!(checked, *r);
     }

@@ -262,7 +262,7 @@ fn closest_points_are_those_of_single_triangles() {
 }
 
 /// Balls that nearly coincide, as in the initial medial mesh of a sphere: bit for bit the least of
-/// all, although nearly all are nearly as near; to within what counts as equal where they are equal
+/// all, although nearly all are nearly as near; to the tolerance of equality where they are equal
 /// but for rounding.
 #[test]
 fn nearly_coincident_balls_are_distinguished() {

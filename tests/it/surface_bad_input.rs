@@ -50,7 +50,7 @@ fn read(bytes: &[u8], format: Format) -> Result<Loaded, surface::SurfaceError> {
         let (peak, size) = (PEAK.with(Cell::get).saturating_sub(start), bytes.len());
         assert!(peak <= 16_000_000 + 100 * size, "{peak} bytes for a file of {size}");
         if let Ok(loaded) = &result {
-            surface::validate(&loaded.mesh).expect("reading guarantees what validation demands");
+            surface::validate(&loaded.mesh).expect("reading guarantees validity");
         }
         result
     })

@@ -720,7 +720,7 @@ pub fn parse_obj(
 fn obj_indices(words: Words<'_>, vertices: usize) -> Result<Vec<u32>, MaError> {
     let mut indices = Vec::new();
     for word in words.rest {
-        // Behind a slash stand texture coordinates and normals.
+        // Texture coordinates and normals follow a slash.
         let number = word.split('/').next().and_then(|text| text.parse::<i64>().ok());
         let from_zero = number.and_then(|number| match number {
             1.. => Some(number - 1),

@@ -28,7 +28,7 @@ pub use viewers::{Look, SphereValues, parse_ply};
 use super::{ComplexError, MedialMesh};
 use crate::atomic::write_atomically;
 
-/// A medial mesh from a file, in canonical form, and what had to be done to bring it there.
+/// A medial mesh from a file, in canonical form, and the changes that this took.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadedMa {
     /// The medial mesh, in the file's unit.

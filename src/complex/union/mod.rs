@@ -339,7 +339,7 @@ impl MedialUnion {
 
     /// Calls `each` for all primitives nearer to `p` than `limit` by signed distance, with that
     /// distance and the centre of the interpolated sphere that attains it. A slab is passed only if its
-    /// nearest sphere is inside the triangle; else the cones of its sides stand for it.
+    /// nearest sphere is inside the triangle; else the cones of its sides replace it.
     pub(crate) fn each_nearer(&self, p: Vec3, limit: f64, each: impl FnMut(f64, Vec3)) {
         self.parts.search(&mut Nearer { parts: &self.parts, p, limit, each });
     }

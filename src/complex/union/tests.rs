@@ -143,7 +143,7 @@ fn the_start_of_a_search_does_not_change_its_result() {
     }
 }
 
-/// The parts that stand for equal ones are as near as any, up to what equal means.
+/// The representatives of equal parts are as near as any, to the tolerance of equality.
 #[test]
 fn no_primitive_is_nearer_than_its_part() {
     let mut rng = Pcg64::seed_from_u64(11);
