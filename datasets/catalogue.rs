@@ -22,7 +22,7 @@ pub struct BuiltIn {
     pub id: &'static str,
     /// Name for tables.
     pub title: &'static str,
-    /// One sentence: the shape, its dimensions, what it is good for.
+    /// One sentence: the shape, its dimensions, its use.
     pub summary: &'static str,
     /// Components, total genus and cavities of the solid, which its medial axis shares.
     pub expected_betti: [u64; 3],

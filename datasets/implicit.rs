@@ -103,7 +103,7 @@ impl Lattice {
     }
 }
 
-/// The corner of a block that the three bits of `corner` say.
+/// The corner of a block with the three bits of `corner`.
 fn offset(low: [u32; 3], corner: u32, size: u32) -> [u32; 3] {
     [0, 1, 2].map(|axis| low[axis as usize] + (corner >> axis & 1) * size)
 }

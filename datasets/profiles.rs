@@ -266,7 +266,7 @@ pub(crate) fn flat_triangle(half: f64, height: f64, n: u32) -> Flat {
 /// Lines from a rectangle with half sides `half` to a circle inside it, counter-clockwise from its lower right
 /// corner; `sides` parts for each vertical and each horizontal side.
 ///
-/// The arcs belong to the sides of the holed plate whatever the rectangle, so that lines of rectangles of
+/// The arcs belong to the sides of the holed plate for any rectangle, so that lines of rectangles of
 /// several sizes meet their circles in the same directions.
 pub(crate) fn around_hole(radius: f64, half: [f64; 2], sides: [u32; 2]) -> Vec<Across> {
     use std::f64::consts::PI;

@@ -42,13 +42,13 @@ pub struct Package {
     pub options: Vec<String>,
 }
 
-/// What a mesh is good for.
+/// The use of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Set {
     /// For comparisons: bounds a solid, has no self-intersection and at least [`MIN_PUBLIC_VERTICES`].
     Public,
-    /// Refused when read, or repaired.
+    /// Rejected when read, or repaired.
     Defective,
     /// As `Public`, with fewer vertices.
     Small,
@@ -62,7 +62,7 @@ pub enum Set {
 pub struct Published {
     /// Unique name, also that of its file in the cache.
     pub name: String,
-    /// What it is good for.
+    /// Its use.
     pub set: Set,
     /// The [`Package::id`].
     pub package: String,

@@ -84,7 +84,7 @@ impl<P: Fn(Vec3) -> Vec3> Builder<'_, P> {
 
     fn vertex(&mut self, node: [usize; 3]) -> u32 {
         let Self { ticks, place, mesh, ids } = self;
-        // By node and not by place: blocks share vertices exactly, whatever `place` rounds.
+        // By node and not by place: blocks share vertices exactly, for any rounding in `place`.
         *ids.entry(node).or_insert_with(|| {
             let at = [0, 1, 2].map(|axis| ticks[axis][node[axis]]);
             mesh.vertices.push(place(Vec3::from(at)));
@@ -136,7 +136,7 @@ pub(crate) fn unit_sphere(frequency: u32) -> TriMesh {
             for j in 0..frequency - i {
                 let up = [vertex(i, j), vertex(i + 1, j), vertex(i, j + 1)];
                 mesh.faces.push(up);
-                // The inverted triangle beside it, which the last row does not have.
+                // The inverted triangle next to it, which the last row does not have.
                 if i + j + 2 <= frequency {
                     mesh.faces.push([up[1], vertex(i + 1, j + 1), up[2]]);
                 }
@@ -233,7 +233,7 @@ fn point(ring: Ring, i: u32) -> Vec3 {
 /// The strip between two rings, each given by its count and first vertex: always the next vertex
 /// of the ring that lags behind, in angle.
 fn connect(faces: &mut Vec<[u32; 3]>, upper: (u32, u32), lower: (u32, u32)) {
-    // A pole has no side of its own: its ring does not advance.
+    // A pole has no side: its ring does not advance.
     let [upper_sides, lower_sides] = [upper.0, lower.0].map(|n| if n == 1 { 0 } else { n });
     let (mut i, mut j) = (0, 0);
     while i < upper_sides || j < lower_sides {
@@ -318,7 +318,7 @@ pub(crate) fn rings(pieces: &[Piece], edge: f64) -> Vec<Ring> {
     }
     let last = points.len() - 1;
     let rings = points.into_iter().enumerate().map(|(i, (radius, z))| match i {
-        // A pole is a pole, whatever the sine of pi is.
+        // A pole is exact, although the sine of pi is not.
         _ if i == 0 || i == last => Ring { count: 1, radius: 0.0, z },
         _ => Ring { count: SECTORS * parts(TAU * radius / f64::from(SECTORS), edge, 1), radius, z },
     });
@@ -356,7 +356,7 @@ pub(crate) struct Curve {
     pub(crate) derivative: fn(f64) -> Vec3,
 }
 
-/// Steps in which arc length is summed. Vertices lie on the tube whatever its error: it decides only how even
+/// Steps in which arc length is summed. Vertices lie on the tube for any error: it decides only how even
 /// the sections are.
 const LENGTH_STEPS: u32 = 4000;
 

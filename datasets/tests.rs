@@ -1,4 +1,4 @@
-//! Every shape against an analytic depth function of its own: nothing shared with the generators.
+//! Every shape against a separate analytic depth function: nothing shared with the generators.
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, Sphere, betti};
@@ -385,7 +385,7 @@ fn contacts(id: &str, Sphere { centre, radius }: Sphere, tolerance: f64) -> Vec<
     found
 }
 
-/// What makes a point medial: its ball touches the surface in two places at least.
+/// A point is medial if its ball touches the surface in two places at least.
 #[test]
 fn the_balls_of_a_known_axis_touch_the_surface_twice() {
     let mut random = Pcg64::seed_from_u64(14);
@@ -441,7 +441,7 @@ fn noise_makes_spikes() {
 /// Corners nearer than this are merged, in diagonals.
 const COINCIDENT: f64 = 1e-6;
 
-/// A crust in units of the diagonal, and what was found of it.
+/// A crust in units of the diagonal, and its properties.
 struct Crust {
     report: SurfaceReport,
     /// From the surface to the crust, and back.

@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let points = sample(&surface, &Sampling::AreaUniform { count: 10_000, seed: 0 });
     let union = MedialUnion::new(&medial)?;
-    // Positive outside the union: what the medial mesh has lost there.
+    // Positive outside the union: the loss of the medial mesh there.
     let outside = union.signed_batch(&points);
     let (worst, lost) =
         (0..).zip(&outside).max_by(|a: &(usize, _), b| a.1.total_cmp(b.1)).ok_or("no sample")?;

@@ -1,4 +1,4 @@
-//! Readers: whatever the bytes, a typed error or what the reader promises.
+//! Readers: any bytes give a typed error or a valid result.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ const SMALL: usize = 2000;
 
 fn surface(bytes: &[u8], format: Format) {
     let Ok(loaded) = surface::read_bytes(bytes, format) else { return };
-    // What reading guarantees is what checking demands.
+    // Reading guarantees all that checking demands.
     let checked = surface::validate(&loaded.mesh).expect("a surface that was read is valid");
     assert_eq!(checked.faces, loaded.mesh.faces.len());
 }
@@ -86,9 +86,9 @@ pub(crate) fn study(bytes: &[u8]) {
     if study.check().is_err() {
         return;
     }
-    // Numbers that TOML has no form for are told; all else comes back.
+    // Numbers without a form in TOML are reported as errors; all else reads back.
     if let Ok(written) = study.to_text() {
-        let again: Study = toml::from_str(&written).expect("what was written can be read");
+        let again: Study = toml::from_str(&written).expect("the written text can be read");
         assert_eq!(again.to_text().ok(), Some(written));
     }
 }

@@ -5,10 +5,10 @@ use medial::complex::collapse::{CollapseComplex, replay};
 use medial::complex::{MedialMesh, Sphere, betti};
 use medial_geometry::{Delaunay, DualComplex, Regular};
 
-/// More points than these say nothing new and take long to check.
+/// More points than these find nothing new and take long to check.
 const MOST: usize = 48;
 
-/// Numbers out of bytes: the first byte says of what kind. Small whole ones meet in every degeneracy there is; any bits
+/// Numbers out of bytes: the first byte selects the kind. Small whole ones meet in every degeneracy there is; any bits
 /// at all, for the range.
 struct Numbers<'b> {
     bytes: &'b [u8],
@@ -51,7 +51,7 @@ pub(crate) fn triangulation(bytes: &[u8]) {
             break;
         }
     }
-    // Points that are not finite or out of range are refused.
+    // Points that are not finite or out of range are rejected.
     if let Ok(delaunay) = Delaunay::new(&points) {
         delaunay.check().expect("a triangulation");
         delaunay.check_geometry().expect("empty spheres");

@@ -1,8 +1,8 @@
-//! What is fuzzed: every reader and the kernels, each as a function of bytes that must neither panic nor hang, and that checks
-//! what the code under it promises.
+//! Fuzzing targets: every reader and the kernels, each as a function of bytes that must neither panic nor hang, and
+//! that checks the guarantees of the code under it.
 //!
 //! `scripts/fuzz TARGET SECONDS` drives a target by coverage (libFuzzer, with the stable compiler). The inputs that it
-//! found worth keeping stand in `corpus/TARGET`, those that once failed in `found/TARGET`; `cargo test` runs all of
+//! found worth keeping are in `corpus/TARGET`, those that once failed in `found/TARGET`; `cargo test` runs all of
 //! them.
 
 #![forbid(unsafe_code)]

@@ -1,4 +1,4 @@
-//! Exports a hash of the sources of each method: `MODULE=HASH;...`, and that of what they share. An edit
+//! Exports a hash of the sources of each method: `MODULE=HASH;...`, and that of shared sources. An edit
 //! of one method changes the version of that method alone.
 
 use std::collections::BTreeMap;
@@ -18,7 +18,7 @@ fn main() {
     let compiler = Command::new(compiler).arg("--version").output().expect("the compiler runs");
     let compiler = String::from_utf8_lossy(&compiler.stdout).trim().to_owned();
     let [target, level] = ["TARGET", "OPT_LEVEL"].map(|name| env::var(name).unwrap_or_default());
-    // A package has no lock file of its own: the one of the build is not known there.
+    // A package has no lock file: that of the build is unknown there.
     let lock = root.join("../Cargo.lock");
     let lock = if lock.exists() { digest(&root, &[lock]) } else { String::new() };
     println!("cargo::rustc-env=BUILD={compiler} {target} {level} {lock}");

@@ -1,6 +1,6 @@
 //! No simplification: the initial medial mesh as it is.
 //!
-//! As a row of its own, it shows which errors and wrong Betti numbers are those of the common start.
+//! Its row in a comparison shows which errors and wrong Betti numbers belong to the common start.
 
 use medial::shape::Shape;
 use medial::simplifier::{
@@ -24,6 +24,6 @@ fn prepare<'s>(shape: &'s Shape, _params: NoParams, _run: &RunContext) -> Prepar
     let initial = shape.initial()?;
     Ok(Box::new(move |level: Level| match level {
         Level::Published => Ok(Simplified::new(initial.as_ref().clone(), level)),
-        _ => Err(SimplifyError::unsupported("the initial medial mesh has no other level")),
+        _ => Err(SimplifyError::unsupported("the only level is the published one")),
     }))
 }

@@ -19,10 +19,10 @@
 //! the default of the program that Yan, Letscher and Ju published with *Voxel cores: efficient, robust,
 //! and provably good approximation of 3D medial axes*, ACM Transactions on Graphics 37(4), 2018, which
 //! prunes by the same measure: facets whose two samples are less than 4 % of the longest side of the
-//! box of the Voronoi vertices inside apart, that is, `lambda` = 2 % of this side. A warning says so.
+//! box of the Voronoi vertices inside apart, that is, `lambda` = 2 % of this side, with a warning.
 //!
 //! # Deviations from the paper
-//! - The text of the Q-MAT paper says "circumradius of the closest points". For a Voronoi vertex
+//! - The text of the Q-MAT paper has "circumradius of the closest points". For a Voronoi vertex
 //!   the circumradius of its four samples is the ball's own radius, which would make this a size
 //!   filter; the smallest enclosing ball is the definition of Chazal and Lieutier.
 
@@ -118,7 +118,7 @@ fn prepare<'s>(shape: &'s Shape, params: LambdaParams, _run: &RunContext) -> Pre
 //
 // # Deviations from the paper
 // - The paper's set is a closed subset of the whole axis; the filter on Voronoi vertices with the
-//   induced subcomplex can be asked for a number of spheres like every other method.
+//   induced subcomplex supports a number of spheres like every other method.
 
 /// Ranks the spheres of the initial medial mesh. `O(n log n)`.
 fn rank_spheres(shape: &Shape) -> Result<Ranked> {
@@ -144,7 +144,7 @@ fn rank_spheres(shape: &Shape) -> Result<Ranked> {
 // 1. The Voronoi facets, edges and vertices inside, each with the value that all its relative
 //    interior has.
 // 2. Keep the cells with `F >= lambda`. The dual of a cell is part of the duals of its sides, so that
-//    values grow from facets to edges to vertices, and what is kept is closed.
+//    values grow from facets to edges to vertices, and the kept part is closed.
 // 3. Facets are cut into triangles. Edges and vertices that pass without a facet stay as they are, or
 //    are left out (`leftovers=false`).
 //
@@ -236,7 +236,7 @@ fn facet_values(shape: &Shape, facets: &VoronoiFacets) -> Result<Vec<f64>> {
 }
 
 impl Cells {
-    /// The least value of a largest set of vertices of at most so many, of which none has the same
+    /// The least value of the largest set of at most `spheres` vertices, of which none has the same
     /// value as one that is left out; of all with the largest value where these are more.
     fn level_for(&self, spheres: usize) -> f64 {
         let values = &self.descending;
@@ -271,8 +271,8 @@ impl Simplification for Cells {
         let mesh = self.kept(lambda);
         let reached = mesh.spheres.len();
         match level {
-            Level::Spheres(asked) if reached != asked => diagnostics.warn(format!(
-                "{reached} spheres instead of {asked}: {}",
+            Level::Spheres(requested) if reached != requested => diagnostics.warn(format!(
+                "{reached} spheres instead of {requested}: {}",
                 if reached == self.mesh.spheres.len() {
                     "there are no more"
                 } else {

@@ -9,7 +9,7 @@
 //!    without the count, values around it are tried at growing distances.
 //!
 //! The search ends at a count of at most [`TOLERANCE`] below the requested one, after [`MAX_PROBES`]
-//! values, or when no value is left to try. The answer is the largest count met that does not exceed the
+//! values, or when no value is left to try. The result is the largest count met that does not exceed the
 //! request. No value is tried twice.
 
 use std::fmt::Debug;
@@ -33,7 +33,7 @@ const TOLERANCE: f64 = 0.02;
 /// Values that are tried at most.
 const MAX_PROBES: usize = 12;
 
-/// Most samples that a search takes: memory and time stay bounded, whatever is asked.
+/// Most samples that a search takes: memory and time stay bounded, for every request.
 const MAX_SAMPLES: f64 = 50_000.0;
 
 /// Longest step of step 2, as a factor.
@@ -120,7 +120,7 @@ impl SizeSearch {
             self.run.step(path.tried.len(), MAX_PROBES)?;
             let probe = or_empty(make(value))?;
             let size = probe.mesh.spheres.len();
-            path.tell(value, size);
+            path.record(value, size);
             let is_better = best.as_ref().is_none_or(|(_, best)| {
                 // Nothing is worst, then too many, then the distance from the count.
                 let [new, old] = [size, best.mesh.spheres.len()]
@@ -143,7 +143,7 @@ impl SizeSearch {
 
     fn explain(
         &self,
-        asked: usize,
+        requested: usize,
         value: f64,
         reached: usize,
         diagnostics: &mut Diagnostics,
@@ -152,20 +152,21 @@ impl SizeSearch {
         let (least, most) = (range.start(), range.end());
         if reached == 0 {
             return Err(SimplifyError::unsupported(format!(
-                "no number of {unit} tried for {asked} spheres gives one, of {least} to {most}"
+                "{requested} spheres: no result with {least} to {most} {unit}"
             )));
         }
-        if reached == asked {
+        if reached == requested {
             return Ok(());
         }
-        let why = if reached > asked {
+        let why = if reached > requested {
             "fewer were not met".to_owned()
         } else if value == *most {
             format!("more than {most} are not tried")
         } else {
             "the nearest count from below that the search met".to_owned()
         };
-        diagnostics.warn(format!("{reached} spheres instead of {asked}, at {value} {unit}: {why}"));
+        diagnostics
+            .warn(format!("{reached} spheres instead of {requested}, at {value} {unit}: {why}"));
         Ok(())
     }
 }
@@ -215,14 +216,14 @@ impl<'a> Path<'a> {
     }
 
     /// Takes the number of spheres at the value that was to try.
-    fn tell(&mut self, value: f64, size: usize) {
+    fn record(&mut self, value: f64, size: usize) {
         self.tried.push(value);
         let is_above = size > self.count;
         if !is_above && size as f64 >= (1.0 - TOLERANCE) * self.count as f64 {
             self.next = None;
             return;
         }
-        // Aims a little below the count, since a larger count is of no use.
+        // Aims a little below the count, since a larger count is useless.
         let aim = (1.0 - TOLERANCE / 2.0) * self.count as f64;
         let end = End { value, excess: ((size as f64).max(0.5) / aim).ln() };
         // Illinois: an end that stays twice counts half.
@@ -279,7 +280,7 @@ pub(crate) fn resampled(shape: &Shape, samples: f64) -> Shape {
     shape.resampled(shape.options().sampling.with_count(samples as usize))
 }
 
-/// A result, or an empty one where there is nothing inside at this value: the search goes on.
+/// A result, or an empty one where there is nothing inside at this value: the search continues.
 fn or_empty(result: Result<Probe>) -> Result<Probe> {
     match result {
         Err(
@@ -322,7 +323,7 @@ impl<'s> ByKnob<'s> {
         Self { prepare: Box::new(prepare), search, native }
     }
 
-    /// By the number of samples of a shape. Builds what all samplings share, the tree and the inside
+    /// By the number of samples of a shape. Builds the parts that all samplings share, the tree and the inside
     /// test of the surface, so that they count as substrates.
     ///
     /// # Errors
@@ -386,7 +387,7 @@ fn outside<T: PartialOrd + Debug>(
     if range.contains(&value) {
         return None;
     }
-    // An interval, because some ends are excluded, and the message has to say which.
+    // An interval, because some ends are excluded, and the message has to name them.
     let least = match range.start_bound() {
         Bound::Included(least) => format!("[{least:?}"),
         Bound::Excluded(least) => format!("({least:?}"),
@@ -403,20 +404,20 @@ fn outside<T: PartialOrd + Debug>(
 /// Refuses a level of no sphere.
 pub(crate) fn some_spheres(level: Level) -> Result<Level> {
     match level {
-        Level::Spheres(0) => Err(SimplifyError::Level("ask for at least one sphere".to_owned())),
+        Level::Spheres(0) => Err(SimplifyError::Level("0 spheres: expected at least 1".to_owned())),
         level => Ok(level),
     }
 }
 
 /// A result, once its mesh is known to be a valid complex.
 pub(crate) fn checked(
-    asked: Level,
+    requested: Level,
     mesh: MedialMesh,
     native_level: Option<f64>,
     diagnostics: Diagnostics,
 ) -> Result<Simplified> {
     mesh.check()?;
-    Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, asked) })
+    Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, requested) })
 }
 
 // Balls in general position, for methods on unions of polar balls.
@@ -456,7 +457,7 @@ mod tests {
             assert!(knob.range.contains(&value) && !values.contains(&value), "{value} {values:?}");
             values.push(value);
             last = size(value);
-            path.tell(value, last);
+            path.record(value, last);
         }
         (values, last)
     }

@@ -41,7 +41,7 @@ pub fn registry() -> Vec<Registered> {
             .sweep(&[30.0, 45.0, 60.0, 90.0, 120.0]),
         Registered::from(lambda::method())
             .best_for(
-                "Removing what is small in absolute size from the axis of dense samples, with a \
+                "Removing small features by absolute size from the axis of dense samples, with a \
                  proof that the rest is stable; not where thin parts must stay next to thick \
                  ones, and not for few spheres.",
             )
@@ -92,7 +92,7 @@ pub fn registry() -> Vec<Registered> {
         Registered::from(aof::method())
             .best_for(
                 "Straight from the surface, where its samples give too poor a start: the \
-                 lattice is as fine as is asked; for thousands of spheres rather than \
+                 lattice is as fine as requested; for thousands of spheres rather than \
                  hundreds.",
             )
             // The published lattice takes far longer: that of the other levels is enough.
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn every_method_has_a_version_of_its_own() {
+    fn every_method_has_its_own_version() {
         let versions: Vec<_> =
             registry().into_iter().map(|r| r.version.expect("a version")).collect();
         for (k, version) in versions.iter().enumerate() {

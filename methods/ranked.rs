@@ -41,11 +41,11 @@ impl Ranked {
         Self { mesh, value, order, scale, prepared }
     }
 
-    fn by_count(&self, asked: usize, diagnostics: &mut Diagnostics) -> (Vec<bool>, f64) {
-        let count = asked.min(self.order.len());
-        if count < asked {
+    fn by_count(&self, requested: usize, diagnostics: &mut Diagnostics) -> (Vec<bool>, f64) {
+        let count = requested.min(self.order.len());
+        if count < requested {
             diagnostics.warn(format!(
-                "asked for {asked} spheres, but the initial medial mesh has only {count}"
+                "{count} spheres instead of {requested}: the initial medial mesh has no more"
             ));
         }
         // The level that would cut here: the value of the first sphere that is dropped.
@@ -76,7 +76,7 @@ impl Simplification for Ranked {
     fn at(&mut self, level: Level) -> Result<Simplified> {
         let mut diagnostics = self.prepared.clone();
         let (keep, native) = match self.scale.wanted(level, &mut diagnostics)? {
-            Wanted::Spheres(asked) => self.by_count(asked, &mut diagnostics),
+            Wanted::Spheres(requested) => self.by_count(requested, &mut diagnostics),
             Wanted::Native(value) => self.by_level(value),
         };
         let mesh = self.mesh.induced(&keep);
@@ -91,7 +91,7 @@ impl Simplification for Ranked {
     }
 }
 
-// How the filters compare a value with a level, and the requests that they answer.
+// How the filters compare a value with a level, and the supported requests.
 
 /// How the values are compared with a native level.
 pub(crate) struct Scale {
@@ -109,7 +109,7 @@ pub(crate) struct Scale {
 pub(crate) enum Published {
     /// The paper's own level.
     Native(f64),
-    /// A documented level where no paper has a single one, and whose it is, as a warning says.
+    /// A documented level where no paper has a single one, and its author, for a warning.
     Documented(f64, &'static str),
     /// There is none, and why.
     None(&'static str),
@@ -169,7 +169,7 @@ pub(crate) fn tie(a: f64, b: f64) -> bool {
     (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
 
-/// Puts every run of values that tie in order. `items` are by descending value; `sphere` says where an
+/// Puts every run of values that tie in order. `items` are by descending value; `sphere` gives where an
 /// item is and how large. `O(n)` where nothing ties.
 pub(crate) fn break_ties<T: Copy>(
     items: &mut [T],
@@ -227,7 +227,7 @@ impl FacetSet {
         Ok(Self { mesh, facets, dual: shape.options().dual })
     }
 
-    /// Refuses a shape with a given medial mesh.
+    /// Rejects a shape with an external initial medial mesh.
     pub(crate) fn refuse_given(shape: &Shape) -> Result<()> {
         if shape.has_given_initial() {
             let why = "it selects facets of the Voronoi diagram of the samples, and a given medial \
@@ -352,8 +352,8 @@ impl Simplification for RankedFacets<'_> {
         let mesh = facets.subcomplex(mesh, *dual, &kept, &[], &[]);
         let reached = mesh.spheres.len();
         match level {
-            Level::Spheres(asked) if reached != asked => diagnostics.warn(format!(
-                "{reached} spheres instead of {asked}: whole facets are kept, {} in all",
+            Level::Spheres(requested) if reached != requested => diagnostics.warn(format!(
+                "{reached} spheres instead of {requested}: whole facets are kept, {} in all",
                 if kept.len() == self.set.facets.len() { "and these are" } else { "the best" }
             )),
             _ if reached == 0 => diagnostics.warn(format!(
@@ -482,7 +482,7 @@ impl<'a> Without<'a> {
     }
 
     /// Whether removing a sheet leaves the Betti numbers as they are: a part of its border is free, and
-    /// its seam, what it shares with others, has its own Euler characteristic, 1.
+    /// its seam, its intersection with others, has Euler characteristic 1.
     pub(crate) fn may_go(&self, sheet: usize) -> bool {
         if self.gone[sheet] {
             return false;

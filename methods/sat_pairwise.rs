@@ -3,7 +3,7 @@
 //! How P. Li, B. Wang, F. Sun, X. Guo, C. Zhang, W. Wang 2015 (Q-MAT, ACM Transactions on Graphics
 //! 35(1), <https://doi.org/10.1145/2753755>) describe the scale axis transform in their section on
 //! related work. It is not that transform, which removes balls that the *union* of all scaled balls
-//! covers and takes the medial axis of that union anew: for this see the method `sat`.
+//! covers and recomputes the medial axis of that union: for this see the method `sat`.
 //!
 //! 1. The initial medial mesh.
 //! 2. The scaled ball `(c_j, s r_j)` contains `(c_i, s r_i)` if and only if
@@ -53,7 +53,7 @@ fn prepare<'s>(shape: &'s Shape, _: NoParams, _run: &RunContext) -> Prepared<'s>
         range: 0.0..=f64::MAX,
         inclusive: false,
         published: Published::None(
-            "this filter is described, not published, as a method; ask for a number of spheres or for \
+            "this filter is described, not published, as a method; request a number of spheres or \
              a scale (1.1 to 2 is usual for the transform)",
         ),
     };
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn what_it_removes_the_transform_removes_too_and_more() {
+    fn the_transform_removes_all_that_it_removes_and_more() {
         let mut rng = Pcg64::seed_from_u64(52);
         let (mut here, mut there) = (0, 0);
         for _ in 0..100 {

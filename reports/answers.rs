@@ -1,12 +1,10 @@
 //! Which method for which purpose: at equal numbers of spheres and at equal errors.
 //!
-//! Each answer is the best of values that belong to one method alone, mesh by mesh: medians and means are over the
-//! meshes that the method ran on, where a missing result counts as infinitely bad. The lead is the ratio of the
-//! best method to the runner-up, on the meshes that both have. So a further method changes no number here
-//! unless it is itself first or second.
+//! For each criterion the table names the best method. Its value belongs to that method alone: a median or mean over
+//! the meshes that it ran on, where a missing result counts as infinite. The ratio to the runner-up is over the
+//! meshes where both have a result. A further method changes a row only if it becomes first or second.
 //!
-//! A method that is cheap on half of the meshes and one that works on nearly all answer two questions, so both are
-//! named where they differ.
+//! The best median and the most results may belong to different methods. Then both are named.
 
 use std::cmp::Ordering;
 
@@ -17,19 +15,19 @@ use crate::summary::{Ratio, reference, topology};
 use crate::tables::{Cell, Column, Table};
 use crate::text::{counted, grouped, significant};
 
-/// Number of spheres that one level is compared at: of those that were asked the one nearest to it.
+/// The table compares results at the requested count nearest to this one.
 const USUAL: f64 = 100.0;
 
 /// Error that the cost of a result is compared at, in % of the diagonal.
 const BOUND: f64 = 1.0;
 
-/// Triangles of a result with a larger error are no merit, in % of the diagonal.
+/// Results with a larger error are not ranked by triangle quality, in % of the diagonal.
 const USABLE: f64 = 2.0;
 
-/// A larger error answers no question, in % of the diagonal: no result is better than such a one.
-const ANSWERS: f64 = 5.0;
+/// Results with a larger error are not ranked by error, in % of the diagonal.
+const RANKED: f64 = 5.0;
 
-/// For each mesh the least value of a method; `None` where the method was not asked.
+/// For each mesh the least value of a method; `None` where the method did not run.
 type Values = Vec<Option<Found>>;
 
 /// A value and the seconds of the result that has it; infinite and unknown without a result.
@@ -39,8 +37,8 @@ struct Found {
     seconds: f64,
 }
 
-/// A question and the value that decides it; less is better.
-struct Question {
+/// A criterion and its values; less is better.
+struct Criterion {
     title: String,
     /// The values of a series.
     values: Vec<Values>,
@@ -50,7 +48,7 @@ struct Question {
     of: &'static str,
 }
 
-/// The table of answers; `None` where nothing can be compared. Of one mesh there are results instead of medians.
+/// The table "Which method?"; `None` where nothing compares. With one mesh it shows results instead of medians.
 pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Table> {
     let mut rows = vec![];
     if let Some((level, spheres)) = usual_level(comparison) {
@@ -59,10 +57,10 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
     rows.extend(within_bound(comparison));
     let is_one = comparison.meshes.len() == 1;
     let rule = format!(
-        "Among the levels that were run. The initial medial mesh and errors above {ANSWERS} % answer no question."
+        "Among the levels that were run, without the initial medial mesh and results with errors above {RANKED} %."
     );
-    let medians = "Medians over the meshes that a method ran on: a missing result counts as infinite, and a method needs results \
-         on half of its meshes. Where the best median and the most results belong to two methods, both are named. The \
+    let medians = "Medians over the meshes that a method ran on. A missing result counts as infinite. A method needs \
+         results on at least half of its meshes. If another method has results on more meshes, it is named, too. The \
          ratio to the runner-up is a geometric mean over the meshes where both have a result."
         .to_owned();
     let notes = [how.to_owned(), rule].into_iter().chain((!is_one).then_some(medians));
@@ -82,17 +80,17 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
         rows,
         grouped: false,
     };
-    // Counts of meshes say nothing about one mesh.
+    // Counts of meshes are redundant for one mesh.
     let table = if is_one { table.without(&["meshes"]) } else { table };
     (!table.rows.is_empty()).then_some(table)
 }
 
-/// The answers at one number of spheres.
+/// The rows at one number of spheres.
 fn at_count(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Vec<Cell>> {
     let spheres = counted(spheres, "sphere", "spheres");
-    let error = error_question(errors_at(comparison, level), format!("lowest error at {spheres}"));
-    let triangles = Question {
-        title: format!("best triangles at {spheres}, of errors up to {USABLE} %"),
+    let error = error_criterion(errors_at(comparison, level), format!("lowest error at {spheres}"));
+    let triangles = Criterion {
+        title: format!("best triangles at {spheres}, errors up to {USABLE} %"),
         values: values(comparison, Some(level), |entry| {
             HAUSDORFF.of(entry.record).filter(|&e| entry.comparable() && e <= USABLE)?;
             // Less must be better: the distance from the angles of an equilateral triangle.
@@ -101,14 +99,14 @@ fn at_count(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Ve
         text: |value| format!("least angle {:.1}°", 60.0 - value),
         of: "its distance from 60°",
     };
-    let mut rows: Vec<Vec<Cell>> = answers(comparison, &error);
+    let mut rows: Vec<Vec<Cell>> = rows_of(comparison, &error);
     rows.push(right_everywhere(comparison, level, &spheres));
-    rows.extend(answers(comparison, &triangles));
+    rows.extend(rows_of(comparison, &triangles));
     rows
 }
 
-fn error_question(values: Vec<Values>, title: String) -> Question {
-    Question {
+fn error_criterion(values: Vec<Values>, title: String) -> Criterion {
+    Criterion {
         title,
         values,
         text: |value| format!("{} %", significant(value, 3)),
@@ -146,7 +144,7 @@ fn within_bound(comparison: &Comparison<'_>) -> Vec<Vec<Cell>> {
             cost(entry.record)
         });
         let title = format!("{title} within {BOUND} % error");
-        rows.extend(answers(comparison, &Question { title, values, text, of }));
+        rows.extend(rows_of(comparison, &Criterion { title, values, text, of }));
     }
     rows
 }
@@ -156,7 +154,7 @@ fn stored_numbers(record: &Record) -> Option<f64> {
     Some(record.evaluate.as_ref()?.counts.numbers() as f64)
 }
 
-/// The asked number of spheres that is nearest to [`USUAL`], of those that any method reached.
+/// The requested number of spheres nearest to [`USUAL`], among those that any method reached.
 pub(crate) fn usual_level(comparison: &Comparison<'_>) -> Option<(usize, usize)> {
     comparison
         .counts()
@@ -192,10 +190,10 @@ fn values(
     all
 }
 
-/// The errors of the results at a count, as far as they answer a question.
+/// The errors of the results at a count, up to [`RANKED`].
 fn errors_at(comparison: &Comparison<'_>, level: usize) -> Vec<Values> {
     values(comparison, Some(level), |entry| {
-        HAUSDORFF.of(entry.record).filter(|&error| entry.comparable() && error <= ANSWERS)
+        HAUSDORFF.of(entry.record).filter(|&error| entry.comparable() && error <= RANKED)
     })
 }
 
@@ -212,12 +210,12 @@ fn middle(values: impl Iterator<Item = f64>) -> Option<f64> {
     }
 }
 
-/// What a series is ranked by.
+/// The rank of a series by one criterion.
 struct Rank {
     series: usize,
     /// `None` where fewer than half of the meshes have a result.
     median: Option<f64>,
-    /// Meshes without a result, of those asked.
+    /// Meshes that the method ran on without a result.
     missed: usize,
     /// Mean of the logarithms of the results, for equal medians.
     mean: f64,
@@ -270,45 +268,45 @@ fn ranked(values: &[Values]) -> Vec<Rank> {
     ranks
 }
 
-/// The rows of a question: the best median, and where that is another the best on the most meshes. None where no
-/// method has a median.
-fn answers(comparison: &Comparison<'_>, question: &Question) -> Vec<Vec<Cell>> {
-    let mut ranks = ranked(&question.values);
+/// The rows of a criterion: the best median, and if different the method with the most results. Empty if no method
+/// has a median.
+fn rows_of(comparison: &Comparison<'_>, criterion: &Criterion) -> Vec<Vec<Cell>> {
+    let mut ranks = ranked(&criterion.values);
     let Some(first) = ranks.first().map(|rank| rank.series) else { return vec![] };
-    let mut rows = vec![answer(comparison, question, question.title.clone(), &ranks)];
-    ranks.sort_by(by_meshes); // the second question, of the same methods
+    let mut rows = vec![row_of(comparison, criterion, criterion.title.clone(), &ranks)];
+    ranks.sort_by(by_meshes);
     if ranks[0].series != first {
-        let title = format!("{}, on the most meshes", question.title);
-        rows.push(answer(comparison, question, title, &ranks));
+        let title = format!("{}, on the most meshes", criterion.title);
+        rows.push(row_of(comparison, criterion, title, &ranks));
     }
     rows
 }
 
 /// The row of the first of the ranked methods.
-fn answer(
+fn row_of(
     comparison: &Comparison<'_>,
-    question: &Question,
+    criterion: &Criterion,
     title: String,
     ranks: &[Rank],
 ) -> Vec<Cell> {
     let first = ranks[0].series;
-    let known = question.values[first].iter().flatten();
+    let known = criterion.values[first].iter().flatten();
     let met = known.clone().filter(|found| found.value.is_finite());
     let seconds = middle(met.clone().map(|found| found.seconds));
     let mut cells = vec![
         Cell::from(title),
         Cell { best: true, ..Cell::from(comparison.series[first].as_str()) },
-        Cell::optional(ranks[0].median.map(question.text)),
+        Cell::optional(ranks[0].median.map(criterion.text)),
         Cell::optional(seconds.map(|seconds| significant(seconds, 3))),
         Cell::from(format!("{} of {}", met.count(), counted(known.count(), "mesh", "meshes"))),
     ];
     let runner_up = ranks.get(1).and_then(|rank| {
-        Some((rank.series, lead(&question.values[first], &question.values[rank.series])?))
+        Some((rank.series, lead(&criterion.values[first], &criterion.values[rank.series])?))
     });
     cells.extend(match runner_up {
         Some((second, ratio)) => [
             Cell::from(comparison.series[second].as_str()),
-            Cell::from(format!("{} of {}", significant(ratio, 2), question.of)),
+            Cell::from(format!("{} of {}", significant(ratio, 2), criterion.of)),
         ],
         None => [Cell::from("no other"), Cell::optional(None)],
     });
@@ -332,7 +330,7 @@ fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) ->
         cells.extend([(); 5].map(|()| Cell::optional(None)));
         return cells;
     }
-    answer(comparison, &error_question(errors, title.clone()), title, &ranks)
+    row_of(comparison, &error_criterion(errors, title.clone()), title, &ranks)
 }
 
 /// All methods at one error bound.
@@ -345,22 +343,21 @@ pub(crate) struct BoundSummary {
 /// One method at one error bound.
 pub(crate) struct BoundRow {
     pub(crate) series: usize,
-    /// Meshes that the method was asked for, and those on which some level keeps the bound.
-    pub(crate) asked: usize,
+    /// Meshes that the method ran on, and those with a level within the bound.
+    pub(crate) requested: usize,
     pub(crate) met: usize,
-    /// Meshes on which there is no answer, for another reason than that no level keeps the bound.
+    /// Meshes without a result for another reason than the bound.
     pub(crate) failed: usize,
-    /// Median over the meshes, where one without an answer counts as infinitely many; `None` where
-    /// the median mesh has none.
+    /// Median over the meshes, where a missing result counts as infinite; `None` where the median is infinite.
     pub(crate) spheres: Option<f64>,
     numbers: Option<f64>,
     seconds: Option<f64>,
-    /// Spheres in relation to the reference's.
+    /// Ratio of spheres to the reference method's.
     ratio: Option<Ratio>,
     topology: (usize, usize),
 }
 
-/// Summaries for every bound that was searched for, from loose to tight.
+/// Summaries for every requested bound, from loose to tight.
 pub(crate) fn by_bound(comparison: &Comparison<'_>) -> Vec<BoundSummary> {
     let reference = reference(comparison);
     let mut summaries = vec![];
@@ -385,43 +382,43 @@ fn bound_row(series: usize, entries: &[&Entry<'_>], yardstick: &[&Entry<'_>]) ->
         let other = yardstick.iter().find(|o| o.mesh == entry.mesh && o.measured())?;
         Some(reached(entry.record)? as f64 / reached(other.record)? as f64)
     });
-    let asked = entries.len();
+    let requested = entries.len();
     BoundRow {
         series,
-        asked,
+        requested,
         met: met.len(),
-        failed: asked - met.len() - missed,
-        spheres: median_of(&met, asked, |record| reached(record).map(|spheres| spheres as f64)),
-        numbers: median_of(&met, asked, stored_numbers),
-        seconds: median_of(&met, asked, |record| TOTAL_SECONDS.of(record)),
+        failed: requested - met.len() - missed,
+        spheres: median_of(&met, requested, |record| reached(record).map(|spheres| spheres as f64)),
+        numbers: median_of(&met, requested, stored_numbers),
+        seconds: median_of(&met, requested, |record| TOTAL_SECONDS.of(record)),
         ratio: Ratio::of(ratios),
         topology: topology(&met),
     }
 }
 
-/// The median over the `asked` meshes, where one without a value counts as infinite.
+/// The median over `requested` meshes, where a missing value counts as infinite.
 fn median_of(
     met: &[&Entry<'_>],
-    asked: usize,
+    requested: usize,
     value: impl Fn(&Record) -> Option<f64>,
 ) -> Option<f64> {
     let mut values: Vec<f64> = met.iter().filter_map(|entry| value(entry.record)).collect();
-    values.resize(asked, f64::INFINITY); // a failure is no cheap result
+    values.resize(requested, f64::INFINITY); // a failure is no cheap result
     // The upper median: at least half of the meshes need no more.
     median(&values).filter(|value| value.is_finite())
 }
 
-/// The table of all bounds; `None` where nothing was searched for.
+/// The table of all bounds; `None` without a requested bound.
 pub(crate) fn equal_error_table(
     comparison: &Comparison<'_>,
     bounds: &[BoundSummary],
     how: &str,
 ) -> Option<Table> {
-    type Place<'b> = (f64, &'b BoundRow);
-    let mut rows: Vec<Place<'_>> = vec![];
+    type BoundPosition<'b> = (f64, &'b BoundRow);
+    let mut rows: Vec<BoundPosition<'_>> = vec![];
     for bound in bounds {
         let mut sorted: Vec<&BoundRow> = bound.rows.iter().collect();
-        // Fewest spheres first. Rows without a median follow, the one that keeps the error most often first.
+        // Fewest spheres first. Rows without a median follow, most meshes within the bound first.
         sorted.sort_by(|a, b| {
             let [few, many] = [a, b].map(|row| row.spheres.unwrap_or(f64::INFINITY));
             few.total_cmp(&many).then(b.met.cmp(&a.met))
@@ -434,7 +431,7 @@ pub(crate) fn equal_error_table(
     let rows = Table::of(&rows)
         .number("error (%)", |(percent, _)| percent.to_string())
         .text("method", |(_, row)| comparison.series[row.series].as_str())
-        .text("kept on", |(_, row)| format!("{} of {}", row.met, row.asked))
+        .text("valid on", |(_, row)| format!("{} of {}", row.met, row.requested))
         .number("spheres ↓", |(_, row)| whole(row.spheres))
         .number(format!("÷ {yardstick}"), |(_, row)| {
             Cell::optional(row.ratio.map(|ratio| significant(ratio.value, 3)))
@@ -451,10 +448,10 @@ pub(crate) fn equal_error_table(
             0 => "none".to_owned(),
             failed => failed.to_string(),
         });
-    let note = "Searched for on each mesh among counts and the method's own levels; fewer spheres at \
-         the same error are better. Medians over all meshes, where one on which no level keeps \
-         the error counts as infinitely many; a dash: so on half of them. The ratio is the \
-         geometric mean of the numbers of spheres in relation to the named method's, on the \
+    let note = "The search runs on each mesh over counts and native levels; fewer spheres at \
+         the same error are better. Medians over all meshes; a mesh without a level within \
+         the error counts as infinite; a dash: on half of them. The ratio is the \
+         geometric mean of the ratios of spheres to those of the named method, on the \
          meshes where both keep the error. Stored numbers: floats of the medial mesh. Seconds \
          are those of the level found, without the search.";
     (!rows.table.rows.is_empty()).then(|| Table {

@@ -1,5 +1,4 @@
-//! Records arranged for comparison: which meshes, which methods, which levels, and what stands
-//! where they meet.
+//! Records arranged for comparison: meshes, methods, levels, and one entry for each combination that was run.
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,9 +9,8 @@ use crate::metric::HAUSDORFF;
 use crate::record::{Record, Status};
 use crate::text::{counted, grouped, printable, trimmed};
 
-/// Largest relative difference between the spheres reached and the spheres asked at which two
-/// results still count as results at the same number of spheres. Methods that search on a level
-/// of their own cannot hit every count.
+/// Largest relative difference of reached from requested spheres at which results still count as results at the same
+/// number of spheres. Methods that search on a native level cannot hit every count.
 const COUNT_TOLERANCE: f64 = 0.02;
 
 /// Every record that counts, by mesh, series and level.
@@ -23,7 +21,7 @@ pub(crate) struct Comparison<'a> {
     pub(crate) series: Vec<String>,
     /// Ids of the methods behind the series.
     pub(crate) methods: Vec<&'a str>,
-    /// The levels that were asked: sphere counts from many to few, published, native.
+    /// The requested levels: sphere counts from many to few, published, native.
     pub(crate) levels: Vec<Target>,
     /// One entry for each combination that was run, by mesh, level and series.
     pub(crate) entries: Vec<Entry<'a>>,
@@ -41,16 +39,16 @@ pub(crate) struct Entry<'a> {
 }
 
 impl Entry<'_> {
-    /// Whether a measured result stands here.
+    /// Whether the entry has a measured result.
     pub(crate) fn measured(&self) -> bool {
         self.record.status.has_result() && self.record.evaluate.is_some()
     }
 
-    /// Whether the result may be compared with others asked for the same number of spheres.
+    /// Whether the result may be compared with others at the same requested number of spheres.
     pub(crate) fn comparable(&self) -> bool {
         match (self.record.simplify.level, reached(self.record)) {
-            (Target::Spheres(asked), Some(reached)) if self.measured() => {
-                reached.abs_diff(asked) as f64 <= COUNT_TOLERANCE * asked as f64
+            (Target::Spheres(requested), Some(reached)) if self.measured() => {
+                reached.abs_diff(requested) as f64 <= COUNT_TOLERANCE * requested as f64
             }
             _ => false,
         }
@@ -66,7 +64,7 @@ pub(crate) fn reached(record: &Record) -> Option<usize> {
         .or_else(|| record.evaluate.as_ref().map(|evaluation| evaluation.counts.spheres as usize))
 }
 
-/// The level as it stands in a table: `100`, `published`, `level 0.3`.
+/// The level as tables show it: `100`, `published`, `level 0.3`.
 pub(crate) fn level_label(level: Target) -> String {
     match level {
         Target::Spheres(count) => grouped(count as u64),
@@ -76,7 +74,7 @@ pub(crate) fn level_label(level: Target) -> String {
     }
 }
 
-/// The row of a record: the name that it was given, or method and parameters.
+/// The row of a record: its name, or method and parameters.
 pub(crate) fn row_name(record: &Record) -> String {
     SeriesKey::of(record).name()
 }
@@ -155,7 +153,7 @@ impl<'a> Comparison<'a> {
         point(entry).is_some_and(|own| rises(own, &points))
     }
 
-    /// The sphere counts that were asked, with their level indices, from many to few.
+    /// The requested sphere counts, with their level indices, from many to few.
     pub(crate) fn counts(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.levels.iter().enumerate().filter_map(|(index, level)| match level {
             Target::Spheres(count) => Some((index, *count)),
@@ -168,7 +166,7 @@ impl<'a> Comparison<'a> {
         self.entries.iter().filter(|entry| entry.measured()).count()
     }
 
-    /// What the reader must know before trusting a comparison of these records.
+    /// Warnings on comparing these records.
     pub(crate) fn cautions(&self) -> Vec<String> {
         let records = || self.entries.iter().map(|entry| entry.record);
         let mut cautions = Vec::new();
@@ -210,13 +208,13 @@ pub(crate) fn rises((spheres, error): (f64, f64), results: &[(f64, f64)]) -> boo
     results.iter().any(|&(fewer, least)| fewer < spheres && error > (1.0 + RISE) * least)
 }
 
-/// The records that count: of one mesh, row and level the last one, whatever build made it. Records
+/// The records that count: of one mesh, row and level the last one, of any build. Records
 /// of an older build stay where the newer one has none.
 fn latest_records<'a>(records: &'a [Record], hashes: &Hashes<'a>) -> Vec<&'a Record> {
     let mut last = BTreeMap::new(); // by item, the index of its last record
     for (index, record) in records.iter().enumerate() {
         let level = serde_json::to_string(&record.simplify.level).unwrap_or_default();
-        last.insert((hashes.key(record), SeriesKey::of(record).asked(), level), index);
+        last.insert((hashes.key(record), SeriesKey::of(record).request(), level), index);
     }
     let counted: BTreeSet<usize> = last.into_values().collect();
     counted.into_iter().map(|index| &records[index]).collect()
@@ -263,7 +261,7 @@ impl<'a> Hashes<'a> {
     }
 }
 
-/// Names, with a piece of the hash where one name stands for several meshes.
+/// Names, with a prefix of the hash where several meshes share one.
 fn mesh_labels(keys: &[MeshKey<'_>]) -> Vec<String> {
     let mut labels = vec![];
     for key in keys {
@@ -277,14 +275,13 @@ fn mesh_labels(keys: &[MeshKey<'_>]) -> Vec<String> {
     labels
 }
 
-/// Enough of a hash to tell a few apart.
+/// Enough of a hash to distinguish a few.
 fn short(hash: &str) -> String {
     hash.chars().take(8).collect()
 }
 
-/// What makes a row of its own: the method with its parameters, and the conditions under which it
-/// ran. Records of two builds, of two samplings or of two accuracies of measuring are never in one
-/// mean.
+/// The identity of a row: the method with its parameters, and the conditions of the run. Records of two builds, of
+/// two samplings or of two accuracies of measuring are never in one mean.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct SeriesKey<'a> {
     method: &'a str,
@@ -302,14 +299,14 @@ struct SeriesKey<'a> {
 impl<'a> SeriesKey<'a> {
     fn of(record: &'a Record) -> Self {
         let simplify = &record.simplify;
-        // By name: the order in which parameters were set makes no row of its own.
+        // By name: the order in which parameters were set makes no separate row.
         let params: BTreeMap<&String, String> =
             simplify.params.0.iter().map(|(key, value)| (key, value.to_string())).collect();
         let params: Vec<String> = (params.iter())
             .map(|(key, value)| format!("{key}={}", value.trim_matches('"')))
             .collect();
         let conditions = record.conditions.as_ref();
-        // The files of one external method are one row, whatever their paths and hashes.
+        // The files of one external method are one row for all paths and hashes.
         let is_external = record.status == Status::External;
         Self {
             method: &simplify.method,
@@ -329,14 +326,13 @@ impl<'a> SeriesKey<'a> {
         }
     }
 
-    /// The row as the user asked for it, whatever build or plug-in answered.
-    fn asked(&self) -> Self {
+    /// The row as requested, without the build or plug-in that ran it.
+    fn request(&self) -> Self {
         Self { build: "", plugin: None, ..self.clone() }
     }
 }
 
-/// The name that was given, or method and parameters; and each condition in which rows of one name
-/// differ.
+/// The row's name, or method and parameters, and each condition in which rows of one name differ.
 fn series_labels(keys: &[SeriesKey<'_>]) -> Vec<String> {
     let mut labels = vec![];
     for key in keys {
@@ -344,7 +340,7 @@ fn series_labels(keys: &[SeriesKey<'_>]) -> Vec<String> {
         let namesakes: Vec<[String; 8]> =
             keys.iter().filter(|other| other.name() == label).map(SeriesKey::conditions).collect();
         for (index, condition) in key.conditions().into_iter().enumerate() {
-            // A condition that all rows of the name share does not tell them apart.
+            // A condition that all rows of the name share does not distinguish them.
             if namesakes.iter().any(|other| other[index] != condition) {
                 label = label + ", " + &condition;
             }
@@ -363,7 +359,7 @@ impl SeriesKey<'_> {
         format!("{} {}", self.method, self.params).trim_end().to_owned()
     }
 
-    /// What tells rows of one name apart, in words.
+    /// The conditions that distinguish rows of one name, in words.
     fn conditions(&self) -> [String; 8] {
         [
             self.method_and_params(),

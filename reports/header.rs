@@ -1,12 +1,11 @@
-//! What stands above the results: what was run, when and where.
+//! The head of a report: the runs, their dates, their machines, the methods.
 
 use medial::simplifier::{MethodInfo, Presentation};
 use serde::{Deserialize, Serialize};
 
 use crate::record::Machine;
 
-/// The head of a report. Nothing in it is found out here: the runner passes it in, so that the
-/// same records and the same header give the same bytes.
+/// The head of a report. The runner passes in everything, so that equal records and headers give equal bytes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// Title of the page.
@@ -18,7 +17,7 @@ pub struct Header {
     /// not run.
     #[serde(default)]
     pub methods: Vec<MethodNote>,
-    /// The study that was asked last, as a file.
+    /// The study of the last run, as a file.
     #[serde(default)]
     pub study: Option<String>,
     /// Remarks on all of it, such as lines of the results that could not be read.
@@ -50,15 +49,15 @@ pub struct RunNote {
     /// SHA-256 of the program.
     #[serde(default)]
     pub binary_hash: String,
-    /// When it ran, as it is to be shown.
+    /// Date of the run, as displayed.
     #[serde(default)]
     pub date: Option<String>,
-    /// Where it ran.
+    /// The machine.
     #[serde(default)]
     pub machine: Option<Machine>,
 }
 
-/// What the page says of a method.
+/// A method as the page describes it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MethodNote {
     /// Id of the method.
@@ -72,10 +71,10 @@ pub struct MethodNote {
     pub bibtex: String,
     /// One sentence on what the method does.
     pub summary: String,
-    /// One sentence on where the method is at home; empty where it does not say.
+    /// One sentence on what the method is best suited for; may be empty.
     #[serde(default)]
     pub home: String,
-    /// What the published level means.
+    /// Meaning of the published level.
     pub published: String,
     /// Name and unit of the method's own level, where it has one.
     #[serde(default)]
@@ -115,7 +114,7 @@ impl Header {
     pub(crate) fn bibtex(&self, methods: &[&str]) -> String {
         let mut entries: Vec<String> = Vec::new();
         for note in self.methods.iter().filter(|note| methods.contains(&note.id.as_str())) {
-            // Variants of a method share its publication, and BibTeX stops at a key that stands twice.
+            // Variants of a method share its publication, and BibTeX rejects a repeated key.
             let entry = note.bibtex.trim();
             if !entry.is_empty() && !entries.iter().any(|known| known == entry) {
                 entries.push(entry.to_owned()); // in the order of the methods
@@ -155,7 +154,7 @@ impl Header {
         format!("{command} --methods {}", methods.join(","))
     }
 
-    /// How the files were made: a sentence that stands in each of them.
+    /// One sentence with version, date and command, for every file.
     pub(crate) fn how(&self) -> String {
         let Some(run) = self.runs.last() else { return "Made by medial.".to_owned() };
         let version = Some(format!(" {}", run.version)).filter(|_| !run.version.is_empty());

@@ -69,11 +69,11 @@ impl Journal {
     }
 }
 
-/// Refuses a path to what is no regular file: a pipe could be read for ever, a device without end. A path to nothing is
-/// left to the reader.
+/// Rejects anything but a regular file: reading a pipe or a device may never end. A missing file is left to the
+/// reader.
 ///
 /// # Errors
-/// When something else is there.
+/// If the path exists and is not a regular file.
 pub fn check_regular(path: &Path) -> io::Result<()> {
     match fs::metadata(path) {
         Ok(target) if !target.is_file() => Err(io::Error::other("not a regular file")),
@@ -96,23 +96,23 @@ fn open_for_lines(path: &Path) -> io::Result<File> {
     Ok(file)
 }
 
-/// What a `results.jsonl` holds.
+/// The content of a `results.jsonl`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Journaled {
     /// The records, in the order of the file.
     pub records: Vec<Record>,
-    /// Lines that hold no record.
+    /// Lines that are no record.
     pub bad_lines: Vec<BadLine>,
 }
 
-/// A line that holds no record.
+/// A line that is no record.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BadLine {
     /// Number of the line, from 1.
     pub line: usize,
-    /// Whether the line stops in the middle of a record: the trace of an interrupted write.
+    /// Whether the line stops in the middle of a record, left by an interrupted write.
     pub torn: bool,
-    /// What is wrong with it.
+    /// The parser's message.
     pub message: String,
 }
 
@@ -126,8 +126,7 @@ impl std::fmt::Display for BadLine {
     }
 }
 
-/// Reads every record of a `results.jsonl`. Lines that hold none are reported beside them, empty
-/// lines are skipped.
+/// Reads every record of a `results.jsonl`. Other lines are returned as [`BadLine`]s, empty lines are skipped.
 ///
 /// # Errors
 /// [`JournalError::Io`] when the file cannot be read.
@@ -175,7 +174,7 @@ pub(crate) fn replace_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// One line with its line break. JSON has no infinity and no NaN and serde writes `null` for
-/// them, which would spoil the record for every reader: such a record is refused here.
+/// them, which no reader accepts: such a record is rejected here.
 fn to_line(record: &Record) -> Result<String, JournalError> {
     let written = serde_json::to_string(record).and_then(|line| {
         let back: Record = serde_json::from_str(&line)?;
@@ -193,22 +192,22 @@ fn to_line(record: &Record) -> Result<String, JournalError> {
 /// Why a `results.jsonl` could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum JournalError {
-    /// The file system refused.
+    /// Reading or writing failed.
     #[error("{}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's message.
         source: io::Error,
     },
     /// The record would not read back as it was.
-    #[error("the record of {method} on {mesh} does not survive JSON: {message}")]
+    #[error("{method} on {mesh}: the record has no JSON form ({message})")]
     Unreadable {
         /// Mesh of the record.
         mesh: String,
         /// Method of the record.
         method: String,
-        /// What was lost.
+        /// The cause.
         message: String,
     },
 }

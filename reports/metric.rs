@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::record::Record;
 use crate::text::{grouped, significant};
 
-/// Which way a number is better.
+/// The better direction of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Better {
     /// Less is better.
@@ -35,7 +35,7 @@ impl Better {
 /// How a number is averaged over meshes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Mean {
-    /// For what spans orders of magnitude; values below the floor count as the floor.
+    /// For values that span orders of magnitude; values below the floor count as the floor.
     Geometric { floor: f64 },
     /// For angles, shares and counts, which may be zero.
     Arithmetic,
@@ -76,7 +76,7 @@ pub(crate) fn median(values: &[f64]) -> Option<f64> {
 /// so that a single zero does not make a geometric mean zero.
 pub(crate) const GEOMETRIC: Mean = Mean::Geometric { floor: 1e-6 };
 
-/// How a number is written.
+/// The digits of a number as text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Digits {
@@ -88,7 +88,7 @@ pub(crate) enum Digits {
     Count,
 }
 
-/// Where a number is found, in the unit of the JSON.
+/// The source of a number, in the unit of the JSON.
 #[derive(Clone, Copy)]
 pub(crate) enum Value {
     Evaluation(fn(&Evaluation) -> Option<f64>),
@@ -106,7 +106,7 @@ pub struct Metric {
     pub title: &'static str,
     /// Unit in a column's head.
     pub unit: &'static str,
-    /// Which way it is better.
+    /// Better direction.
     pub better: Better,
     pub(crate) mean: Mean,
     pub(crate) digits: Digits,
@@ -239,10 +239,10 @@ const fn count(key: &'static str, title: &'static str, value: Measured) -> Metri
     Metric::new(key, title, "", kind, Value::Evaluation(value))
 }
 
-/// Threshold on the stability ratio whose spikes stand in the tables; the CSV has the others, too.
+/// Threshold on the stability ratio whose spikes the tables show; the CSV has all.
 pub(crate) const SPIKE_RATIO: f64 = 0.1;
 
-// The metrics of the comparison tables, which plots and answers name.
+// The metrics of the comparison tables, which plots and "Which method?" use.
 pub(crate) const HAUSDORFF: Metric =
     length("hausdorff", "Hausdorff", |e| Some(e.distances.hausdorff))
         .defined(
@@ -303,7 +303,7 @@ pub(crate) const TOTAL_SECONDS: Metric = Metric::new(
     Value::Record(|record| Some(record.seconds()?.total)),
 )
 .defined(
-    "Wall-clock seconds as if this level had been asked alone: the shared substrates that \
+    "Wall-clock seconds as if only this level had been requested: the shared substrates that \
          the method uses, its preparation, and the simplification. Evaluation is never \
          included.",
 );

@@ -55,7 +55,7 @@ pub(crate) fn overview_table(
         .number("Hausdorff %", |row| mean(row, &HAUSDORFF))
         .number("mean %", |row| mean(row, &MEAN_ERROR))
         .text("topology", |row| Cell::share(row.topology))
-        .number("means over", |row| Cell::share((row.over, row.asked)))
+        .number("means over", |row| Cell::share((row.over, row.requested)))
         .number("seconds", |row| mean(row, &TOTAL_SECONDS))
         .text("best suited for", |row| {
             let note = methods.iter().find(|note| note.id == comparison.methods[row.series]);
@@ -83,7 +83,7 @@ pub(crate) fn overview_table(
 }
 
 /// The end of a comparison as plain text, at most 100 characters wide: the table of all methods at the requested count
-/// nearest to 100, and that of the error bounds where there are any. `methods` tells what each is best suited for.
+/// nearest to 100, and that of the error bounds where there are any. `methods` has what each is best suited for.
 pub fn summary_text(records: &[Record], methods: &[MethodNote]) -> String {
     let comparison = Comparison::new(records);
     let mut text = String::new();

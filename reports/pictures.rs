@@ -1,9 +1,8 @@
-//! Which results are shown beside each other as pictures.
+//! Which results the pictures show side by side.
 //!
-//! For each mesh one strip: the results of all methods at the number of spheres that the answers of
-//! [`answers`](crate::answers) are for, with external results at theirs, the least error first, and a 3D view of the
-//! same. Drawing needs the surfaces and the medial meshes, which are not in the records: it is for the caller, with
-//! [`strip`](crate::render::strip).
+//! For each mesh one strip: the results of all methods at the count of [`answers`](crate::answers), with external
+//! results at their counts, the least error first, and a 3D view of the same. Drawing needs the surfaces and the
+//! medial meshes, which are not in the records: the caller does it, with [`strip`](crate::render::strip).
 
 use std::collections::BTreeMap;
 
@@ -15,7 +14,7 @@ use crate::metric::HAUSDORFF;
 use crate::record::{Record, Status};
 use crate::text::{file_stems, grouped};
 
-/// Folders of the pictures and of the 3D views, beside the page.
+/// Folders of the pictures and of the 3D views, next to the page.
 pub(crate) const FOLDER: &str = "pictures";
 pub(crate) const VIEWS: &str = "views";
 
@@ -26,11 +25,11 @@ pub struct PictureStrip {
     pub mesh: String,
     /// Hash of the input file or of the generated surface, as the records have it.
     pub mesh_hash: Option<String>,
-    /// Where the picture belongs, relative to the folder of the report.
+    /// Path of the picture, relative to the folder of the report.
     pub file: String,
     /// The name of the 3D view of the same results.
     pub view: String,
-    /// The medial meshes, by path relative to the folder of the report, and what is said of each.
+    /// The medial meshes, by path relative to the folder of the report, and their captions.
     pub panels: Vec<(String, String)>,
 }
 
@@ -41,8 +40,8 @@ pub fn picture_strips(records: &[Record]) -> Vec<PictureStrip> {
 }
 
 impl PictureStrip {
-    /// A name that another choice of results, or other errors beside them, does not have: a picture of an earlier
-    /// run is never shown beside the numbers of a later one.
+    /// A name that depends on all results and their errors: a page never shows the picture of an earlier run next to
+    /// the numbers of a later one.
     fn name(&mut self, stem: &str) {
         let bytes = self.panels.iter().flat_map(|(artifact, caption)| [artifact, caption]);
         let bytes = bytes.flat_map(|text| text.bytes().chain([0]));
@@ -51,7 +50,7 @@ impl PictureStrip {
         self.file = format!("{FOLDER}/{}.png", self.view);
     }
 
-    /// Where the 3D view belongs, relative to the folder of the report.
+    /// Path of the 3D view, relative to the folder of the report.
     pub fn view_file(&self) -> String {
         format!("{VIEWS}/{}.js", self.view)
     }
@@ -64,7 +63,7 @@ pub(crate) fn strips(comparison: &Comparison<'_>) -> BTreeMap<usize, PictureStri
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
     for (mesh, name) in comparison.meshes.iter().enumerate() {
         let mut shown: Vec<(f64, &Entry<'_>)> = (comparison.of_mesh(mesh))
-            // A file of another program has one number of spheres, whatever that is.
+            // A file of another program has one number of spheres, of any size.
             .filter(|entry| entry.level == level || entry.record.status == Status::External)
             .filter(|entry| entry.measured() && entry.record.artifact.is_some())
             .filter_map(|entry| Some((HAUSDORFF.of(entry.record)?, entry))) // a caption names it
@@ -94,9 +93,9 @@ pub(crate) fn strips(comparison: &Comparison<'_>) -> BTreeMap<usize, PictureStri
     strips
 }
 
-/// Of some meshes the one that tells most about the methods at the count of the strips: among those that the most
+/// Of some meshes the one that separates the methods best at the count of the strips: among those that the most
 /// methods ran on the one with the largest ratio of the worst error to the best.
-pub(crate) fn most_telling(
+pub(crate) fn widest_spread(
     comparison: &Comparison<'_>,
     meshes: impl Iterator<Item = usize>,
 ) -> Option<usize> {

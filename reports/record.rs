@@ -1,10 +1,9 @@
 //! The record of one item of a comparison: a line of `results.jsonl`.
 //!
-//! One mesh, one method, one level: what was asked, what came out, what it measured, and where
-//! and how it ran. A run that failed leaves a record like any other, with its status and reason
-//! and without the parts that it never got to. Keys are part of the product's interface: other
-//! programs read them. Unknown keys are ignored on reading, so that older versions read newer
-//! files.
+//! One mesh, one method, one level: the request, the result, its measurements, and the conditions of the run. A
+//! failed run leaves a record, too, with its status and reason and without the parts that it did not reach. Keys are
+//! part of the product's interface: other programs read them. Unknown keys are ignored on reading, so that older
+//! versions read newer files.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -17,29 +16,29 @@ use serde::{Deserialize, Serialize};
 
 use crate::text::{counted, megabytes};
 
-/// What became of one item.
+/// The status of one item.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
-    /// A valid medial mesh came out.
+    /// A valid medial mesh.
     Ok,
-    /// A valid medial mesh, from a file of another program.
+    /// A valid medial mesh, read from a file of another program.
     #[serde(alias = "as_given")]
     External,
-    /// A valid medial mesh came out, with a number of spheres more than 2 % off the one asked.
+    /// A valid medial mesh with a number of spheres more than 2 % off the requested one.
     OtherCount,
-    /// No level that was tried keeps the error bound: an answer, not a failure.
+    /// No level that was tried keeps the error bound: not a failure.
     BoundMissed,
-    /// The method does not do this, or leaves nothing at this level: an answer, not a failure.
+    /// The method does not support this, or leaves nothing at this level: not a failure.
     Unsupported,
-    /// Not begun, because the method had used up its budget of time on this mesh: not a failure.
+    /// Not started, since the method had used up its time budget on this mesh: not a failure.
     Skipped,
-    /// The input was refused before the method saw it, or by a check of the method's own.
+    /// The input was rejected before the method ran, or by a check of the method.
     Refused,
     /// The method returned an error.
-    // The default: a record that nobody completes must not count as a result.
+    // The default: a record that is never completed must not count as a result.
     #[default]
     Failed,
     /// The method panicked, or its process was killed by a signal.
@@ -48,7 +47,7 @@ pub enum Status {
     TimedOut,
     /// The memory limit was reached.
     OutOfMemory,
-    /// What came out is not a valid medial mesh.
+    /// The output is not a valid medial mesh.
     InvalidOutput,
 }
 
@@ -69,22 +68,22 @@ impl Status {
         Self::InvalidOutput,
     ];
 
-    /// Whether the result is as it was asked, or as it was given.
+    /// Whether the result meets the request, or is an external one.
     pub fn is_ok(self) -> bool {
         matches!(self, Self::Ok | Self::External)
     }
 
-    /// Whether there is a result to measure, at the count that was asked or another.
+    /// Whether there is a result to measure, at the requested count or another.
     pub fn has_result(self) -> bool {
         matches!(self, Self::Ok | Self::External | Self::OtherCount)
     }
 
-    /// Whether something went wrong: neither a result nor a plain answer that there is none.
+    /// Whether something went wrong: neither a result nor a status such as `unsupported`.
     pub fn is_failure(self) -> bool {
         !self.has_result() && !matches!(self, Self::BoundMissed | Self::Unsupported | Self::Skipped)
     }
 
-    /// The word that stands in the JSON.
+    /// The word in the JSON.
     pub fn key(self) -> &'static str {
         match self {
             Self::Ok => "ok",
@@ -118,7 +117,7 @@ pub fn file_inside(folder: &Path, path: &str) -> Option<PathBuf> {
 }
 
 impl fmt::Display for Status {
-    /// The words for people: `timed out` rather than `timed_out`.
+    /// The words of tables and pages: `timed out` rather than `timed_out`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(&self.key().replace('_', " "))
     }
@@ -136,28 +135,27 @@ pub struct Record {
     /// The dataset that the mesh comes from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dataset: Option<String>,
-    /// Hash of the input file or of the generated surface, so that equal names are not taken for
-    /// equal meshes.
+    /// Hash of the input file or of the generated surface: equal names may be different meshes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mesh_hash: Option<String>,
-    /// What became of the item.
+    /// Status of the item.
     pub status: Status,
-    /// Why, where the status is not `ok`: one sentence for the user.
+    /// The reason, where the status is not `ok`: one sentence.
     pub reason: Option<String>,
-    /// What was asked of the method, and what it answered.
+    /// The request to the method, and its output.
     pub simplify: Simplify,
-    /// What was measured on the answer. Absent where there is none, or where it was not measured.
+    /// The evaluation of the output. Absent where there is none, or where it was not measured.
     pub evaluate: Option<Evaluation>,
-    /// Wall-clock seconds of the evaluation; part of no method's time. The levels of a method are
-    /// measured side by side, and levels with the same result once.
+    /// Wall-clock seconds of the evaluation; part of no method's time. The levels of a method are measured in
+    /// parallel, and levels with the same result once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub evaluate_seconds: Option<f64>,
     /// The medial mesh that every simplifier of this shape starts from.
     pub initial: Option<Initial>,
-    /// What the result depends on beside input, method and level.
+    /// Settings of the run except input, method and level.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub conditions: Option<Conditions>,
-    /// SHA-256 of the resulting medial mesh: equal results are equal here.
+    /// SHA-256 of the resulting medial mesh; the same for equal results.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub result_hash: Option<String>,
     /// Every seed by its purpose, such as `sampling`, `method`, `evaluation`.
@@ -166,7 +164,7 @@ pub struct Record {
     /// Every timed repetition, raw, in the order they ran. [`Simplify::seconds`] is their summary.
     #[serde(default)]
     pub repetitions: Vec<Repetition>,
-    /// Where it ran.
+    /// The machine.
     #[serde(default)]
     pub machine: Machine,
     /// Version of the method, a hash of its sources; empty in records of older builds.
@@ -187,7 +185,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// Whether no other item of the run disturbed the seconds: only such seconds compare.
+    /// Whether no other item of the run disturbed the seconds: only such seconds are comparable.
     pub(crate) fn ran_alone(&self) -> bool {
         self.conditions.as_ref().is_none_or(|conditions| conditions.jobs <= 1)
     }
@@ -200,27 +198,27 @@ impl Record {
 
 /// The `simplify` object: one method at one level.
 ///
-/// Only what was asked is always there; the rest is absent where the run did not get so far.
+/// Only the request is always present; the rest is absent where the run ended earlier.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Simplify {
-    /// What became of the run.
+    /// Status of the run.
     pub status: Status,
     /// Id of the method.
     pub method: String,
-    /// Name of the method with these parameters in tables, where it was given one.
+    /// Name of the method with these parameters in tables, if the user named it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variant: Option<String>,
-    /// Parameters as the user gave them; an empty object stands for the paper's values.
+    /// Parameters that the user set; an empty object means the paper's values.
     #[serde(default)]
     pub params: Params,
     /// Seed of the method's random choices.
     #[serde(default)]
     pub seed: u64,
-    /// The level that was asked.
+    /// The requested level.
     pub level: Target,
-    /// Number of spheres that was reached.
+    /// Reached number of spheres.
     pub reached: Option<usize>,
-    /// The method's own level that was used, where it has one.
+    /// Native level that was used, where the method has one.
     pub native_level: Option<f64>,
     /// Spheres of the result.
     pub spheres: Option<usize>,
@@ -228,7 +226,7 @@ pub struct Simplify {
     pub edges: Option<usize>,
     /// Faces of the result.
     pub faces: Option<usize>,
-    /// Wall-clock seconds of each shared substrate that the method used, whoever built it first.
+    /// Wall-clock seconds of each shared substrate that the method used, even if another method built it.
     #[serde(default)]
     pub substrates: BTreeMap<String, f64>,
     /// Wall-clock seconds by stage.
@@ -238,15 +236,15 @@ pub struct Simplify {
     /// The most memory that the run needed at one time, in bytes: live bytes of the heap with the
     /// substrates that the method used, as if it had been alone.
     pub peak_bytes: Option<u64>,
-    /// Seconds by the method's own clock, for programs that tell them.
+    /// Seconds by the method's own clock, for programs that report them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub own_seconds: Option<OwnSeconds>,
-    /// Threads that the method was given.
+    /// Threads of the method.
     pub threads: Option<usize>,
     /// Named counts of the method, such as `rejected_by_link_condition`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub diagnostics: BTreeMap<String, u64>,
-    /// Sentences for the user.
+    /// Warnings, one sentence each.
     #[serde(default)]
     pub warnings: Vec<String>,
     /// Version of the program.
@@ -255,13 +253,13 @@ pub struct Simplify {
 }
 
 impl Simplify {
-    /// A request without an answer: what a run that failed at once leaves behind.
+    /// A request without a result: the record of a run that failed at once.
     pub fn asked(method: impl Into<String>, level: Target, status: Status) -> Self {
         Self { status, method: method.into(), level, ..Self::default() }
     }
 }
 
-/// Seconds by the clock of an external program, beside the runner's own.
+/// Seconds by the clock of an external program, next to the runner's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct OwnSeconds {
     /// The method's work that does not depend on the level.
@@ -270,7 +268,7 @@ pub struct OwnSeconds {
     pub simplify: Option<f64>,
 }
 
-/// What a result depends on beside input, method and level.
+/// Settings of a run except input, method and level.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Conditions {
     /// Boundary samples.
@@ -306,7 +304,7 @@ pub struct Stages {
     pub substrate: f64,
     /// The method's work that does not depend on the level.
     pub prepare: f64,
-    /// From there to this level, as if it had been asked alone.
+    /// From there to this level, as if no other level had been requested.
     pub simplify: f64,
     /// The sum of the stages.
     pub total: f64,
@@ -340,12 +338,12 @@ pub struct Initial {
     pub faces: u64,
     /// Betti numbers over Z2, where they were computed.
     pub betti: Option<[u64; 3]>,
-    /// What the solid's own topology demands: components, total genus, cavities.
+    /// The solid's topology: components, total genus, cavities.
     pub expected_betti: Option<[u64; 3]>,
 }
 
 impl Initial {
-    /// What is to be said of an initial medial mesh.
+    /// Counts and topology of an initial medial mesh.
     pub fn of(mesh: &MedialMesh, expected_betti: Option<[u64; 3]>) -> Self {
         Self {
             spheres: mesh.spheres.len() as u64,
@@ -357,7 +355,7 @@ impl Initial {
     }
 }
 
-/// Where a run took place.
+/// The machine of a run.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Machine {
     /// Model of the processor.
@@ -409,7 +407,7 @@ impl From<Level> for Target {
 }
 
 impl Target {
-    /// Whether it is a level of the method's own, the published one included.
+    /// Whether it is a native level, the published one included.
     pub(crate) fn is_native(self) -> bool {
         matches!(self, Self::Published | Self::Native(_))
     }

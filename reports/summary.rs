@@ -1,12 +1,11 @@
 //! Means over meshes that no other method changes.
 //!
-//! 1. Each method has one *set* of meshes for all its means: those on which it reached every count
-//!    that counts for it, so that a curve over counts never changes meshes on its way. Counts that
-//!    it reached on few meshes do not count for it, the rarest first, until the set holds at least
-//!    half of the meshes it was asked for. A count left out so has no mean; how often it was
-//!    reached is said.
-//! 2. Methods are ranked by ratios to one reference method, mesh by mesh, over the meshes that both
-//!    reached. A mesh that a method misses costs that method its point, and nobody else.
+//! 1. Each method has one *set* of meshes for all its means: those on which it reached every count that counts for
+//!    it, so that a curve over counts never changes meshes on its way. Counts reached on the fewest meshes are
+//!    dropped until the set covers at least half of the requested meshes. A dropped count has no mean, but the table
+//!    still shows how often it was reached.
+//! 2. Methods are ranked by ratios to one reference method, mesh by mesh, over the meshes that both reached. A mesh
+//!    that a method misses changes that method's values alone.
 //!
 //! Which other methods ran decides no number here but where the reference itself is missing.
 
@@ -24,11 +23,11 @@ const REFERENCE: &str = "qmat";
 
 /// All methods at one number of spheres.
 pub(crate) struct CountSummary {
-    /// The number of spheres that was asked.
+    /// The requested number of spheres.
     pub(crate) count: usize,
-    /// Number of meshes that any method was asked for.
+    /// Number of meshes that any method ran on.
     pub(crate) meshes: usize,
-    /// One row for each series that was asked for this count.
+    /// One row for each series that ran at this count.
     pub(crate) rows: Vec<SeriesSummary>,
 }
 
@@ -37,9 +36,9 @@ pub(crate) struct SeriesSummary {
     pub(crate) series: usize,
     /// Meshes that the means are over: the method's own set; 0 where this count has no mean.
     pub(crate) over: usize,
-    /// Meshes that the method was asked for.
-    pub(crate) asked: usize,
-    /// Meshes without such a result, by what became of them.
+    /// Meshes that the method ran on.
+    pub(crate) requested: usize,
+    /// Meshes without such a result, by status.
     pub(crate) without: BTreeMap<Status, usize>,
     /// Means of [`COMPARED`] by their keys, and the number of meshes that each is over.
     means: BTreeMap<&'static str, (f64, usize)>,
@@ -77,7 +76,7 @@ impl SeriesSummary {
         self.means.get(metric.key).map(|(mean, _)| *mean)
     }
 
-    /// Meshes that the mean of a metric is over: where a result has no triangle, say, there is no angle.
+    /// Meshes that the mean of a metric is over: a result without a triangle, for example, has no angle.
     pub(crate) fn over(&self, metric: &Metric) -> usize {
         self.means.get(metric.key).map_or(0, |(_, over)| *over)
     }
@@ -100,7 +99,7 @@ pub(crate) fn reference(comparison: &Comparison<'_>) -> Option<usize> {
     })
 }
 
-/// Summaries for every number of spheres that was asked, from many to few.
+/// Summaries for every requested number of spheres, from many to few.
 pub(crate) fn by_count(comparison: &Comparison<'_>) -> Vec<CountSummary> {
     let counts: BTreeSet<usize> = comparison.counts().map(|(level, _)| level).collect();
     let mut sets = vec![];
@@ -118,29 +117,29 @@ pub(crate) fn by_count(comparison: &Comparison<'_>) -> Vec<CountSummary> {
 pub(crate) struct OwnSet {
     pub(crate) levels: BTreeSet<usize>,
     pub(crate) meshes: BTreeSet<usize>,
-    /// Meshes that it was asked for.
-    pub(crate) asked: usize,
+    /// Meshes that the method ran on.
+    pub(crate) requested: usize,
 }
 
 impl OwnSet {
-    /// From each level and mesh that was asked, and whether the result there counts.
+    /// From each requested level and mesh, and whether the result there counts.
     pub(crate) fn of(entries: impl Iterator<Item = (usize, usize, bool)>) -> Self {
-        let mut asked = BTreeSet::new(); // failures included
+        let mut requested = BTreeSet::new(); // failures included
         let mut reached: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
         for (level, mesh, counts) in entries {
-            asked.insert(mesh);
+            requested.insert(mesh);
             reached.entry(level).or_default().extend(counts.then_some(mesh));
         }
-        let asked = asked.len();
+        let requested = requested.len();
         loop {
             let meshes = reached.values().cloned().reduce(|a, b| &a & &b).unwrap_or_default();
             // Levels are from many spheres to few: of two as rare, the finer one goes.
             let rarest = reached.iter().min_by_key(|(level, meshes)| (meshes.len(), **level));
             match rarest.map(|(&level, _)| level) {
-                Some(rarest) if 2 * meshes.len() < asked || meshes.is_empty() => {
+                Some(rarest) if 2 * meshes.len() < requested || meshes.is_empty() => {
                     reached.remove(&rarest); // each round drops one, so the loop ends
                 }
-                _ => return Self { levels: reached.into_keys().collect(), meshes, asked },
+                _ => return Self { levels: reached.into_keys().collect(), meshes, requested },
             }
         }
     }
@@ -180,16 +179,16 @@ fn at_count(
         }
         meshes.extend(entries.iter().map(|entry| entry.mesh)); // of any method
         // A count that has no mean leaves no entry.
-        let mut kept = entries.clone();
-        kept.retain(|entry| {
+        let mut averaged = entries.clone();
+        averaged.retain(|entry| {
             set.levels.contains(&level) && entry.comparable() && set.meshes.contains(&entry.mesh)
         });
         let mut means = BTreeMap::new();
         for metric in COMPARED {
             let known = set.known(comparison, series, metric);
-            let values = kept.iter().filter(|entry| known.contains(&entry.mesh));
+            let values = averaged.iter().filter(|entry| known.contains(&entry.mesh));
             let values: Vec<f64> = values.filter_map(|entry| metric.of(entry.record)).collect();
-            // A mean over less than half of the meshes tells of others than those that were asked for.
+            // A mean over less than half of the meshes would not represent the requested ones.
             let enough = 2 * values.len() >= entries.len();
             let mean = metric.mean.of(&values).filter(|_| enough);
             means.extend(mean.map(|mean| (metric.key, (mean, values.len()))));
@@ -198,15 +197,15 @@ fn at_count(
         reached.retain(|entry| entry.comparable()); // of all meshes, not of the own set
         let mut without = BTreeMap::new();
         for entry in entries.iter().filter(|entry| !entry.comparable()) {
-            // Also where the status of an older build does not say so.
+            // Also for records of older builds, which lack this status.
             let status = entry.record.status;
             let status = if status.is_ok() { Status::OtherCount } else { status };
             *without.entry(status).or_default() += 1;
         }
         rows.push(SeriesSummary {
             series,
-            over: kept.len(),
-            asked: entries.len(),
+            over: averaged.len(),
+            requested: entries.len(),
             without,
             means,
             ratio: ratio(&entries, &yardstick),
@@ -248,13 +247,13 @@ pub(crate) fn pick(metric: &Metric, a: f64, b: f64) -> f64 {
     if metric.better.prefers(b, a) { b } else { a }
 }
 
-/// One method at levels of its own.
+/// One method at native levels.
 pub(crate) struct NativeCurve {
     pub(crate) series: usize,
     /// Meshes that all means are over.
     pub(crate) over: usize,
-    /// Meshes that it was asked for at such levels.
-    pub(crate) asked: usize,
+    /// Meshes that the method ran on at such levels.
+    pub(crate) requested: usize,
     /// From fine to coarse.
     pub(crate) points: Vec<NativePoint>,
 }
@@ -271,7 +270,7 @@ pub(crate) struct NativePoint {
     pub(crate) topology: (usize, usize),
 }
 
-/// The curves of all series that ran at levels of their own, the published one included.
+/// The curves of all series that ran at native levels, the published one included.
 pub(crate) fn native_curves(comparison: &Comparison<'_>) -> Vec<NativeCurve> {
     (0..comparison.series.len()).filter_map(|series| native_curve(comparison, series)).collect()
 }
@@ -283,13 +282,13 @@ fn native_curve(comparison: &Comparison<'_>, series: usize) -> Option<NativeCurv
     let set = OwnSet::of(own.iter().map(|entry| (entry.level, entry.mesh, entry.measured())));
     let mut points = Vec::new();
     for &level in &set.levels {
-        let mut kept = comparison.at(series, level);
-        kept.retain(|entry| set.meshes.contains(&entry.mesh));
-        points.extend(native_point(comparison.levels[level], &kept));
+        let mut averaged = comparison.at(series, level);
+        averaged.retain(|entry| set.meshes.contains(&entry.mesh));
+        points.extend(native_point(comparison.levels[level], &averaged));
     }
     points.sort_by(|a, b| b.spheres.total_cmp(&a.spheres)); // fine to coarse
-    let (over, asked) = (set.meshes.len(), set.asked);
-    (!points.is_empty()).then_some(NativeCurve { series, over, asked, points })
+    let (over, requested) = (set.meshes.len(), set.requested);
+    (!points.is_empty()).then_some(NativeCurve { series, over, requested, points })
 }
 
 fn native_point(level: Target, entries: &[&Entry<'_>]) -> Option<NativePoint> {
@@ -309,15 +308,15 @@ fn mean_of(entries: &[&Entry<'_>], value: fn(&Record) -> Option<f64>) -> Option<
     GEOMETRIC.of(&values?)
 }
 
-/// The table of all methods at levels of their own.
+/// The table of all methods at native levels.
 pub(crate) fn native_table(
     comparison: &Comparison<'_>,
     curves: &[NativeCurve],
     header: &Header,
     how: &str,
 ) -> Table {
-    type Place<'c> = (&'c NativeCurve, &'c NativePoint);
-    let points: Vec<Place<'_>> = curves
+    type NativePosition<'c> = (&'c NativeCurve, &'c NativePoint);
+    let points: Vec<NativePosition<'_>> = curves
         .iter()
         .flat_map(|curve| curve.points.iter().map(move |point| (curve, point)))
         .collect();
@@ -329,7 +328,7 @@ pub(crate) fn native_table(
                 (level, _) => level_label(level),
             }
         })
-        .text("means over", |(curve, _)| Cell::share((curve.over, curve.asked)))
+        .text("means over", |(curve, _)| Cell::share((curve.over, curve.requested)))
         .number("spheres", |(_, point)| grouped(point.spheres.round() as u64))
         .number(HAUSDORFF.heading(), |(_, point)| significant(point.hausdorff, 3))
         .number(MEAN_ERROR.heading(), |(_, point)| significant(point.mean, 3))
@@ -337,7 +336,7 @@ pub(crate) fn native_table(
         .text("topology right", |(_, point)| Cell::share(point.topology));
     let note = "Geometric means over one set of meshes for each method: those with a result at all \
          its levels. The level is the method's own scalar, with its name and unit. Spheres are \
-         what the level leaves; compare errors at equal numbers of them. Lengths in % of the \
+         those of the result; compare errors at equal numbers of them. Lengths in % of the \
          bounding-box diagonal.";
     Table {
         caption: "Every method at levels of its own".to_owned(),
@@ -356,8 +355,8 @@ pub(crate) fn means_table(
     summaries: &[CountSummary],
     how: &str,
 ) -> Table {
-    type Place<'s> = (&'s CountSummary, &'s SeriesSummary);
-    let places: Vec<Place<'_>> = summaries
+    type MeanPosition<'s> = (&'s CountSummary, &'s SeriesSummary);
+    let places: Vec<MeanPosition<'_>> = summaries
         .iter()
         .flat_map(|summary| summary.rows.iter().map(move |row| (summary, row)))
         .collect();
@@ -365,7 +364,7 @@ pub(crate) fn means_table(
     let mut rows = Table::of(&places)
         .number("spheres", |(summary, _)| grouped(summary.count as u64))
         .text("method", |(_, row)| comparison.series[row.series].as_str())
-        .text("means over", |(_, row)| Cell::share((row.over, row.asked)))
+        .text("means over", |(_, row)| Cell::share((row.over, row.requested)))
         .number(format!("Hausdorff ÷ {yardstick}"), |(_, row)| {
             Cell::optional(row.ratio.map(|ratio| significant(ratio.value, 3)))
         })
@@ -386,14 +385,14 @@ pub(crate) fn means_table(
     let notes = [
         how,
         "Geometric means of errors and total time, arithmetic means of angles, shares and \
-         spikes. Each method is averaged over one set of meshes of its own for all counts: \
-         those on which it reached every count that it reached on enough of them. Means over \
-         all meshes read beside each other; in parentheses are those over fewer, with their number \
-         where some of the set have no such value, as an angle where there is no triangle. Across \
+         spikes. Each method has its own set of meshes, the same for all counts: \
+         those with all counts that it reached on at least half of them. Means over \
+         all meshes are comparable; in parentheses are those over fewer, with their number \
+         where some of the set have no such value, as an angle without a triangle. Across \
          different sets, compare the ratio: the geometric mean of the Hausdorff errors in \
-         relation to the named method's, on the meshes where both reached the count.",
-        "Lengths in % of the bounding-box diagonal; seconds of wall clock. Arrows: which way \
-         is better. Bold: best of the means over all meshes.",
+         relation to those of the named method, on the meshes where both reached the count.",
+        "Lengths in % of the bounding-box diagonal; wall-clock seconds. Arrows point in the better \
+         direction. Bold: best of the means over all meshes.",
     ];
     Table {
         caption: MEANS.to_owned(),
@@ -419,7 +418,7 @@ fn mean_cell(summary: &CountSummary, row: &SeriesSummary, metric: &Metric) -> Ce
     Cell { text, best }
 }
 
-/// What became of the meshes that are in no mean.
+/// The meshes in no mean, counted by status.
 fn without_result(row: &SeriesSummary) -> String {
     let parts = row.without.iter().map(|(status, count)| format!("{count} {status}"));
     let parts: Vec<String> = parts.collect();

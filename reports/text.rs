@@ -1,4 +1,4 @@
-//! Numbers and names as people read them, and names that are safe as file names.
+//! Numbers and names as text, and names that are safe as file names.
 
 /// A number with a fixed count of significant digits, without an exponent where it can be read
 /// without one: `1.52`, `0.0371`, `34702`, `1.2e-9`.
@@ -75,7 +75,7 @@ pub fn printable(text: &str) -> String {
         .map(|c| match c {
             '\n' | '\r' | '\t' => ' ',
             c if c.is_control() => '\u{fffd}',
-            // Direction marks would reorder everything beside them.
+            // Direction marks would reorder the text around them.
             '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => {
                 '\u{fffd}'
             }

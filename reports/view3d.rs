@@ -1,4 +1,4 @@
-//! What the page shows in three dimensions: a surface and the medial meshes of its results.
+//! The 3D views of the page: a surface and the medial meshes of its results.
 //!
 //! A view is a script file of one call, so that a page that was opened from a disk can load it:
 //! browsers let it load scripts from there, and nothing else. Its text is gzip in Base64 of
@@ -6,13 +6,13 @@
 //! | bytes | what |
 //! |---|---|
 //! | 4 | length of the head, little-endian as all that follows |
-//! | head | JSON, what the arrays mean; filled up with spaces to a multiple of four |
+//! | head | JSON, the meaning of the arrays; filled up with spaces to a multiple of four |
 //! | `u32` | faces of the surface, three vertices each, as differences from the number before |
 //! | for each result | spheres, four `f32` each; edges, two `u32` each; faces, three `u32` each |
 //! | `u16` | vertices of the surface, in steps from the lowest corner |
 //! | for each result | one byte for each vertex: its signed error, 128 for none |
 //!
-//! Coarse surfaces are refined without changing their shape, because errors are told at vertices; very
+//! Coarse surfaces are refined without changing their shape, because errors belong to vertices; very
 //! fine ones are coarsened.
 
 use std::collections::HashMap;
@@ -25,8 +25,7 @@ use serde_json::json;
 use crate::page::{pack, page_of_view};
 use crate::render::{Camera, ColourMap, Errors, Scale};
 
-/// A surface is refined up to edges of this share of its diagonal, as long as it has at most so many
-/// vertices.
+/// Edges of a refined surface, as a share of its diagonal, while it has at most [`REFINED`] vertices.
 const EDGE: f64 = 1.0 / 50.0;
 const REFINED: usize = 20_000;
 
@@ -47,7 +46,7 @@ pub struct View3d<'a> {
 }
 
 impl<'a> View3d<'a> {
-    /// A view of a surface with medial meshes, and what is said of each.
+    /// A view of a surface with medial meshes, and their captions.
     ///
     /// # Errors
     /// When a medial mesh is empty or not valid.
@@ -280,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_are_told_by_bytes() {
+    fn errors_are_encoded_as_bytes() {
         let ends = [-2.0, -1.0, 0.0, 0.5, 1.0, 9.0].map(byte_of);
         assert_eq!(ends, [1, 1, 128, 192, 255, 255]);
     }

@@ -28,11 +28,11 @@ use crate::view3d::text_of;
 ///
 /// Each file is written under a temporary name and renamed. The same records and header give the
 /// same bytes. Files in `tables/` and `plots/` that an earlier report left there under a name
-/// such as `mesh-*` and that this one does not write are removed, so that no stale number stays
-/// beside the new ones. `results.jsonl` is the runner's and is not touched.
+/// such as `mesh-*` and that this one does not write are removed, so that no stale number remains. `results.jsonl` is
+/// the runner's and is not touched.
 ///
-/// Of several records of one item the last one counts. Records without any result give a page
-/// that says that nothing was measured; it is for the caller to end in an exit code that says so.
+/// Of several records of one item the last one counts. Records without any result give a page that reports that
+/// nothing was measured; the caller sets the exit code.
 ///
 /// # Errors
 /// [`ReportError`] when a file cannot be written, or a plot or the CSV cannot be made.
@@ -123,7 +123,7 @@ pub fn write_report(
 /// BibTeX of the methods that ran and of the program.
 pub(crate) const BIBTEX: &str = "tables/methods.bib";
 
-/// Of more meshes none has plots of its own: they would be thousands of files that nobody opens.
+/// Studies of more meshes have no plots for each mesh, which would be thousands of files.
 pub(crate) const MOST_PLOTTED: usize = 100;
 
 /// Bytes of the pictures that are part of the page; further ones are linked. In Base64 they take a third more.
@@ -178,20 +178,20 @@ pub fn read_header(dir: &Path) -> Result<Header, ReportError> {
 /// Why a report could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// The file system refused.
+    /// Reading or writing failed.
     #[error("{}: {source}", path.display())]
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The system's message.
         source: io::Error,
     },
     /// A file could not be made from the records.
-    #[error("{what} could not be made: {message}")]
+    #[error("{what}: cannot be made ({message})")]
     Content {
         /// The file.
         what: &'static str,
-        /// What went wrong.
+        /// The cause.
         message: String,
     },
 }
@@ -202,7 +202,7 @@ impl ReportError {
     }
 }
 
-/// The folder of the report and what was written there.
+/// The folder of the report and the written files.
 struct Files<'a> {
     dir: &'a Path,
     written: Vec<PathBuf>,
@@ -248,7 +248,7 @@ impl Files<'_> {
         self.write(&format!("tables/{stem}.tex"), latex.as_bytes())
     }
 
-    /// Removes what an earlier report left under the names that only a report gives.
+    /// Removes files of an earlier report, by names that only a report gives.
     /// The pictures and views that are `shown` stay.
     fn remove_stale(&self, shown: &[PathBuf]) -> Result<(), ReportError> {
         for folder in ["tables", "plots", FOLDER, VIEWS] {

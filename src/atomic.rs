@@ -45,7 +45,7 @@ pub fn write_atomically(
     written
 }
 
-/// Removes the temporary files of writes in progress: what a process does that ends itself without
+/// Removes the temporary files of writes in progress: for a process that ends itself without
 /// unwinding, since no destructor runs then.
 pub fn remove_temporaries() {
     live(|paths| {
@@ -71,7 +71,7 @@ fn complete(
         temporary.as_file().set_permissions(replaced.permissions())?;
     }
     fill(temporary.as_file(), content)?;
-    // On the disk before the name: after a crash the name must not stand for an empty file.
+    // On the disk before the name: after a crash the name must not belong to an empty file.
     temporary.as_file().sync_all()?;
     temporary.persist(target)?;
     Ok(())

@@ -1,13 +1,13 @@
-//! What is to be said beside a result.
+//! Counts and warnings of a result.
 
 use serde::{Deserialize, Serialize};
 
-/// Counts and remarks beside a result.
+/// Counts and warnings of a result.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Diagnostics {
     /// Named counts, such as `rejected_by_link_condition`, in the order of the algorithm.
     pub counts: Vec<(String, u64)>,
-    /// Sentences for the user, such as why the asked count was not reached.
+    /// Sentences for the user, such as the reason why the requested count was not reached.
     pub warnings: Vec<String>,
 }
 

@@ -29,10 +29,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Heap;
 
-/// A thread hands over once it has allocated or freed so many bytes more than the reverse.
+/// A thread hands over once it has allocated or freed this many bytes more than the reverse.
 const HAND_OVER: i64 = 64 * 1024;
 
-/// Live bytes of all threads, but for what they have not handed over.
+/// Live bytes of all threads, except bytes not yet handed over.
 static LIVE: AtomicI64 = AtomicI64::new(0);
 /// The highest [`LIVE`] since the last [`usage_of`] began or ended.
 static HIGHEST: AtomicI64 = AtomicI64::new(0);
@@ -43,10 +43,10 @@ thread_local! {
     static PENDING: Cell<i64> = const { Cell::new(0) };
 }
 
-/// Runs when an allocation is refused.
+/// Runs when an allocation fails.
 static ON_REFUSAL: OnceLock<fn()> = OnceLock::new();
 
-/// Sets what runs whenever the system refuses an allocation, before the program aborts or copes.
+/// Sets a function that runs whenever an allocation fails, before the program aborts or copes.
 /// The first call counts. `hook` must not allocate.
 pub fn on_refusal(hook: fn()) {
     let _ = ON_REFUSAL.set(hook);
@@ -63,7 +63,7 @@ fn counted(pointer: *mut u8, bytes: i64) -> *mut u8 {
 }
 
 fn count(bytes: i64) {
-    // While a thread ends its cell may be gone: what it allocates then is not counted.
+    // While a thread ends its cell may be gone: later allocations are not counted.
     let _ = PENDING.try_with(|pending| {
         pending.set(pending.get() + bytes);
         if pending.get().abs() >= HAND_OVER {
@@ -83,7 +83,7 @@ fn hand_over(pending: &Cell<i64>) {
 #[allow(unsafe_code)] // An allocator cannot be written without.
 unsafe impl GlobalAlloc for Heap {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        // SAFETY: the caller's promise is passed on.
+        // SAFETY: the caller's guarantee is passed on.
         counted(unsafe { System.alloc(layout) }, layout.size() as i64)
     }
 
@@ -105,34 +105,34 @@ unsafe impl GlobalAlloc for Heap {
     }
 }
 
-/// What a piece of work took of the heap, beyond what was live when it began.
+/// Heap use of a piece of work, beyond the live bytes at its begin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Usage {
-    /// What is still live at its end; 0 where it freed more than it allocated.
+    /// Live bytes at its end; 0 where it freed more than it allocated.
     pub held_bytes: u64,
     /// The highest number of live bytes during the work.
     pub peak_bytes: u64,
 }
 
-/// Does `work` and says what it took of the heap, on all threads of the process.
+/// Runs `work` and measures its heap use, on all threads of the process.
 ///
 /// Calls may be nested. Calls side by side on two threads see each other's bytes.
 pub fn usage_of<T>(work: impl FnOnce() -> T) -> (T, Usage) {
     measured(work, |surrounding, highest| surrounding.max(highest))
 }
 
-/// As [`usage_of`], for work that is accounted for by itself: what it needs and frees again is not in
-/// the peak of a surrounding call, what it leaves is.
+/// As [`usage_of`], for work that is accounted for separately: memory that it frees again is not in the peak of a
+/// surrounding call, memory that it leaves is.
 pub fn usage_apart<T>(work: impl FnOnce() -> T) -> (T, Usage) {
     measured(work, |surrounding, _| surrounding)
 }
 
-/// Measures `work`; `told` is what a surrounding call learns, from the highest number of live bytes
-/// that it had seen before and the highest during the work.
-fn measured<T>(work: impl FnOnce() -> T, told: impl FnOnce(i64, i64) -> i64) -> (T, Usage) {
+/// Measures `work`. `outer` computes the peak of a surrounding call from the highest number of live bytes before and
+/// during the work.
+fn measured<T>(work: impl FnOnce() -> T, outer: impl FnOnce(i64, i64) -> i64) -> (T, Usage) {
     PENDING.with(hand_over);
     let before = LIVE.load(Ordering::Relaxed);
-    // What the surrounding work has seen so far is put aside, and given back at the end.
+    // The peak of the surrounding work is saved, and restored at the end.
     let seen = HIGHEST.swap(before, Ordering::Relaxed);
     let surrounding = SURROUNDING.swap(before, Ordering::Relaxed).max(seen);
     let value = work();
@@ -140,7 +140,7 @@ fn measured<T>(work: impl FnOnce() -> T, told: impl FnOnce(i64, i64) -> i64) -> 
     let after = LIVE.load(Ordering::Relaxed);
     let inner = SURROUNDING.load(Ordering::Relaxed);
     let highest = HIGHEST.swap(after, Ordering::Relaxed).max(inner);
-    SURROUNDING.store(told(surrounding, highest), Ordering::Relaxed);
+    SURROUNDING.store(outer(surrounding, highest), Ordering::Relaxed);
     let beyond = |bytes: i64| u64::try_from(bytes - before).unwrap_or(0);
     (value, Usage { held_bytes: beyond(after), peak_bytes: beyond(highest) })
 }

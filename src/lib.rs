@@ -9,7 +9,7 @@
 //! | [`complex`] | the medial mesh, its formats, its topology, the edge-collapse engine |
 //! | [`metrics`] | Hausdorff distances, triangle quality, spikes, topology against the solid's own |
 //! | [`shape`] | one normalised input with its substrates, each built once, on demand, and timed |
-//! | [`simplifier`] | the trait [`simplifier::MedialSimplifier`] and what goes in and out of it |
+//! | [`simplifier`] | the trait [`simplifier::MedialSimplifier`] with its inputs and outputs |
 //!
 //! Lengths are in units of the input's bounding-box diagonal wherever a [`shape::Shape`] is
 //! involved, and in the unit of the arguments everywhere else.
@@ -52,7 +52,7 @@ pub use atomic::{remove_temporaries, write_atomically};
 pub use colour::{ColourMap, decode_srgb};
 
 pub use geometry::Vec3;
-/// Triangulations, dual complexes, box trees, distances to sphere, cone and slab: a crate of its own.
+/// Triangulations, dual complexes, box trees, distances to sphere, cone and slab: a separate crate.
 pub use medial_geometry as geometry;
 // For the code that `parameters!` generates.
 #[doc(hidden)]

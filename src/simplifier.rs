@@ -111,7 +111,7 @@ where
 pub enum Level {
     /// The paper's own defaults: a constant, a schedule, no scalar at all.
     Published,
-    /// A number of spheres: what makes methods comparable.
+    /// A number of spheres: methods are compared at equal numbers.
     Spheres(usize),
     /// The method's own scalar, in the unit that [`MethodInfo::native`] names.
     Native(f64),
@@ -234,16 +234,16 @@ where
         let NoParams {} = params.typed()?;
         let function = self.function.clone();
         Ok(Box::new(move |level: Level| match level {
-            Level::Spheres(0) => Err(SimplifyError::Level("ask for at least one sphere".into())),
+            Level::Spheres(0) => Err(SimplifyError::Level("0 spheres: expected at least 1".into())),
             Level::Spheres(count) => Ok(Simplified::new(function(shape, count)?, level)),
-            _ => Err(SimplifyError::unsupported("ask for a number of spheres")),
+            _ => Err(SimplifyError::unsupported("request a number of spheres")),
         }))
     }
 }
 
 // The context of a run, and its errors.
 
-/// What surrounds a run: seed, cancellation, progress. The number of threads is that of the
+/// The context of a run: seed, cancellation, progress. The number of threads is that of the
 /// rayon pool in which the method is called.
 #[derive(Clone, Default)]
 pub struct RunContext {
@@ -263,7 +263,7 @@ pub struct Progress {
 }
 
 impl RunContext {
-    /// A context with a seed, never cancelled, that reports to nobody.
+    /// A context with a seed, never cancelled, without reports.
     pub fn with_seed(seed: u64) -> Self {
         Self { seed, ..Self::default() }
     }
@@ -284,7 +284,7 @@ impl RunContext {
         self.cancelled.load(Ordering::Relaxed)
     }
 
-    /// Reports progress and asks whether to go on. Called every few thousand steps.
+    /// Reports progress and checks for cancellation. Called every few thousand steps.
     ///
     /// # Errors
     /// [`SimplifyError::Cancelled`] once the flag is set.
@@ -302,10 +302,10 @@ impl RunContext {
 /// Why a method gave no result.
 #[derive(Debug, thiserror::Error)]
 pub enum SimplifyError {
-    /// The method does not do this: an answer, not a failure.
+    /// The method does not support this: not a failure.
     #[error("unsupported: {why}")]
     Unsupported {
-        /// What it does not do, and what it does instead.
+        /// The missing feature, and the alternative.
         why: String,
     },
     /// A parameter is unknown, of the wrong type or out of range.
@@ -320,10 +320,10 @@ pub enum SimplifyError {
     /// The method returned something that is no valid complex.
     #[error("invalid output: {0}")]
     InvalidOutput(String),
-    /// A hierarchy cannot be built, or is not one of the method that was asked to go on from it.
+    /// A hierarchy cannot be built, or belongs to another method.
     #[error("hierarchy: {0}")]
     Hierarchy(String),
-    /// The method could not do it, and says why in its own words.
+    /// The method failed, with its message.
     #[error("failed: {0}")]
     Failed(String),
     /// An allocation of the method failed, and the method survived it.
@@ -338,7 +338,7 @@ pub enum SimplifyError {
 }
 
 impl SimplifyError {
-    /// [`SimplifyError::Unsupported`] with what the method does not do, and what it does instead.
+    /// [`SimplifyError::Unsupported`] with the missing feature, and the alternative.
     pub fn unsupported(why: impl Into<String>) -> Self {
         Self::Unsupported { why: why.into() }
     }
@@ -356,11 +356,11 @@ impl From<ComplexError> for SimplifyError {
 const LEVEL: &str = "level";
 /// Its word for the published level.
 const PUBLISHED: &str = "published";
-/// What stands before the parameters of the first method.
+/// Prefix of the parameters of the first method.
 const FIRST: &str = "first.";
 
 /// Two methods as one: the second starts from the result of the first at one level, and returns all
-/// levels, each after a preparation of its own.
+/// levels, each after a separate preparation.
 pub struct Chain {
     first: Arc<dyn MedialSimplifier>,
     filter: Level,
@@ -460,7 +460,7 @@ impl MedialSimplifier for Chain {
     }
 }
 
-/// The second method on what the first one left.
+/// The second method on the result of the first.
 struct Started {
     shape: Shape,
     then: Arc<dyn MedialSimplifier>,
@@ -478,13 +478,13 @@ impl Simplification for Started {
     }
 }
 
-// What only some methods give, kept by type.
+// Results of some methods only, stored by type.
 
-/// What a method gives beside the medial mesh: at most one value of each type.
+/// Results of a method besides the medial mesh: at most one value of each type.
 ///
 /// A method that has voxels, named parts or a hierarchy defines their type, or takes one that
-/// exists, and announces it in [`MethodInfo::extras`](MethodInfo::extras). Whoever knows the
-/// type can ask for it; everybody else passes it on. Clones share the values.
+/// exists, and announces it in [`MethodInfo::extras`](MethodInfo::extras). Code that knows the type can request it;
+/// all other code passes it on. Clones share the values.
 ///
 /// ```
 /// use medial::simplifier::Extras;

@@ -4,13 +4,13 @@
 
 These programs take tetrahedra or a format of their own, write into folders of their own, and some stay open in a window when
 they are done. So: the input is converted, the program is started, and the first medial mesh that it has finished writing is
-taken; then it is ended. Variables of the environment name what is needed:
+taken; then it is ended. Environment variables name the inputs:
 
     MATTOPO, MATSTRUCT, MATFP    the program
     MATFP_PRE                    the program that prepares its input
     FTETWILD                     fTetWild, which fills a surface with tetrahedra (for MATTopo and MATStruct)
 
-Exit code 65: the program is not there, or does not do what was asked.
+Exit code 65: the program is not there, or did not do the task.
 """
 
 import argparse
@@ -21,7 +21,7 @@ import subprocess
 import sys
 import time
 
-# A file that has not grown for so many seconds is complete.
+# A file that has not grown for this number of seconds is complete.
 SETTLED = 3.0
 
 
@@ -36,7 +36,7 @@ def program(variable):
         refuse(f"set the variable {variable} to the program: docs/adapters.md")
     path = pathlib.Path(path).resolve()
     if not os.access(path, os.X_OK):
-        refuse(f"{variable}: {path} is no program that can be run")
+        refuse(f"{variable}: {path} is not an executable program")
     return path
 
 

@@ -198,7 +198,7 @@ impl Grid {
         let sum = (a + b).length();
         let sum = if sum > OPPOSITE { sum } else { 0.0 };
         let angle = 2.0 * (a - b).length().atan2(sum);
-        // Directions are kept in single precision: what agrees to this is one angle.
+        // Directions are kept in single precision: angles that agree to this are equal.
         let angle = (angle.to_degrees() / ANGLE_STEP).round() * ANGLE_STEP;
         let corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[u, v]| {
             let mut at = place;
@@ -298,8 +298,8 @@ impl Simplification for Faces {
         let mesh = self.mesh(count);
         let reached = mesh.spheres.len();
         match level {
-            Level::Spheres(asked) if reached != asked => diagnostics.warn(format!(
-                "{reached} spheres instead of {asked}: whole faces between voxels are kept, {} of {}",
+            Level::Spheres(requested) if reached != requested => diagnostics.warn(format!(
+                "{reached} spheres instead of {requested}: whole faces between voxels are kept, {} of {}",
                 count,
                 self.faces.len()
             )),
@@ -316,7 +316,7 @@ impl Simplification for Faces {
 
 // Angle filter on a grid, where the resolution decides the number of spheres.
 //
-// Foskey, Lin and Manocha control the size of the result by the grid: `theta` says which sheets there
+// Foskey, Lin and Manocha control the size of the result by the grid: `theta` decides which sheets there
 // are, the resolution how finely they are cut. A number of spheres is met by a search over the
 // resolution (`methods/levels.rs`) at the `theta` of the parameters. It can have a fraction,
 // reported in thousandths: then the last voxels stick out of the bounding box.
@@ -324,7 +324,7 @@ impl Simplification for Faces {
 /// Finest lattice of a search: eight million voxels for a cube.
 const FINEST: f64 = 200.0;
 
-/// The shape on lattices of any resolution. Builds what all of them share, the tree and the inside
+/// The shape on lattices of any resolution. Builds their shared parts, the tree and the inside
 /// test of the surface.
 pub(super) fn prepare_by_resolution<'s>(
     shape: &'s Shape,

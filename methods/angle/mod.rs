@@ -23,7 +23,7 @@
 //! # The published level
 //! The papers choose `theta` for each model. [`Level::Published`](medial::simplifier::Level) is
 //! `theta` = 60 degrees: an object angle of 30, at which the authors' tool of the scale axis (Miklos,
-//! Giesen, Pauly 2010) filters the sheets of its own results. A warning says so.
+//! Giesen, Pauly 2010) filters the sheets of its results. A warning reports it.
 //!
 //! # Equal angles
 //! Many angles are exactly 180 degrees. Of equal angles, spheres and sheets of larger balls are kept
@@ -201,7 +201,7 @@ fn rank_spheres(shape: &Shape, scale: Scale) -> Result<Ranked> {
 //    allows, with their sides and corners.
 //
 // # Deviations from the papers
-// - The part of Attali and Montanvert's paper that we know does not say where on a facet the angle is
+// - The part of Attali and Montanvert's paper known to us does not state where on a facet the angle is
 //   measured. The scale axis tool uses the mean of the vertices for its own filter.
 
 /// Ranks the Voronoi facets. `O(n)` for their vertices.
@@ -230,7 +230,7 @@ fn rank_facets(shape: &Shape, at: FacetAngle, scale: Scale) -> Result<RankedFace
 const MIDDLE: f64 = 1e-9;
 
 /// Degrees between two points that are equally far from `x`. The arc tangent keeps its digits where
-/// the arc sine loses half of them, and needs no clamp. At the middle it is 180 whatever the rounding,
+/// the arc sine loses half of them, and needs no clamp. At the middle it is 180 with any rounding,
 /// which would otherwise decide between the many that have it.
 fn angle_from(x: Vec3, [p, q]: [Vec3; 2]) -> f64 {
     let (half_chord, off) = (p.distance(q) / 2.0, x.distance(p.midpoint(q)));
@@ -342,8 +342,8 @@ fn peel(shape: &Shape, scale: Scale, run: &RunContext) -> Result<Peeled> {
     Ok(Peeled { set, sheets, removed, left, scale, diagnostics })
 }
 
-/// Sheets by ascending value; of those that tie the smallest first, so that what is left is spread over
-/// the thick parts. All that hold the middle of their two samples have 180 degrees.
+/// Sheets by ascending value; of equal values the smallest first, so that the rest is spread over the thick parts.
+/// All that hold the middle of their two samples have 180 degrees.
 fn in_order(set: &FacetSet, value: &[f64]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..value.len() as u32).collect();
     order.par_sort_unstable_by(|&a, &b| {
@@ -420,14 +420,15 @@ impl Simplification for Peeled {
             }
         };
         let mesh = self.mesh(count);
-        if let Level::Spheres(asked) = level
-            && mesh.spheres.len() != asked
+        if let Level::Spheres(requested) = level
+            && mesh.spheres.len() != requested
         {
-            let why = match mesh.spheres.len() > asked {
+            let why = match mesh.spheres.len() > requested {
                 true => "no other sheet can go without a change of topology",
                 false => "whole sheets are removed",
             };
-            diagnostics.warn(format!("{} spheres instead of {asked}: {why}", mesh.spheres.len()));
+            diagnostics
+                .warn(format!("{} spheres instead of {requested}: {why}", mesh.spheres.len()));
         }
         diagnostics.count("sheets_removed", count);
         let native_level = Some(native);

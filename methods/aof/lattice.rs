@@ -72,7 +72,7 @@ impl Grid {
     }
 }
 
-/// The voxels of a lattice that the spheres of a result stand for, one for each sphere in the same
+/// The voxels of a lattice of the spheres of a result, one for each sphere in the same
 /// order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LatticeVoxels {

@@ -39,7 +39,7 @@
 //!   [`Level::Published`] has the paper's: `resolution=369`, `variant=plain`, a flux of -0.2,
 //!   `spiral=classic`, `start=coarse`, `dismiss=zero`, `refine=false`, unless set otherwise.
 //!   If 369 does not fit into `max_memory`, or no coarse voxel fits into the solid, a warning names
-//!   what is done instead.
+//!   the substitute.
 //! - Either spiral has a mean direction that is not zero, so that a constant field has a flux of up
 //!   to that length. Coarse voxels are dismissed if `AOF'` is not below minus this length
 //!   (`dismiss=bias`); with the paper's 0 (`dismiss=zero`) half the directions of a plane are never
@@ -47,7 +47,7 @@
 //!   the built-in box 31 % with zero and 64 % with bias.
 //! - If the start set on a lattice has other Betti numbers than the solid, or leaves part of the
 //!   surface far from every voxel, the lattice is refined up to three times, and the best one is used
-//!   (`solid.rs`). Warnings name what is still lost.
+//!   (`solid.rs`). Warnings list the remaining losses.
 //! - Line 3 of Algorithm 1, read literally, begins with the smallest spheres. The intended meaning is
 //!   `sigma` at the coarsest level and `sigma / d^j` after `j` divisions.
 //! - The equal-area spiral is the default: its largest error on a plane through the centre is about
@@ -121,7 +121,7 @@ fn prepare<'s>(shape: &'s Shape, settings: AofSettings, run: &RunContext) -> Pre
     let base = solid.base()?;
     let run = run.clone();
     Ok(Box::new(move |level: Level| {
-        // The published level has a lattice of its own, unless all parameters are set.
+        // The published level has a separate lattice, unless all parameters are set.
         if level == Level::Published && settings.at(level) != solid.params {
             let (solid, base) = solid::published(shape, &settings, &run)?;
             return at(&solid, &base, level);

@@ -157,22 +157,22 @@ fn collapse(
 ) -> Result<(Vec<bool>, Vec<bool>)> {
     // For each triangle the number of tetrahedra left at it, and the exclusive or of their ids: with
     // one left, that is its id.
-    let mut beside = vec![(0_u32, 0_u32); lengths.len()];
+    let mut adjacent = vec![(0_u32, 0_u32); lengths.len()];
     for (k, tetrahedron) in (0..).zip(tetrahedra) {
         for &triangle in tetrahedron {
-            let (count, all) = &mut beside[triangle as usize];
+            let (count, all) = &mut adjacent[triangle as usize];
             *count += 1;
             *all ^= k;
         }
     }
     // Triangles that have, or had, one tetrahedron.
-    let free = (0..).zip(&beside).filter(|(_, (count, _))| *count == 1);
+    let free = (0..).zip(&adjacent).filter(|(_, (count, _))| *count == 1);
     let mut free: BinaryHeap<(u8, Reverse<u32>)> =
         free.map(|(t, _): (u32, _)| (lengths[t as usize], Reverse(t))).collect();
     let (mut is_open, mut left_out) = (vec![true; tetrahedra.len()], vec![false; lengths.len()]);
     let mut steps = 0_usize;
     while let Some((_, Reverse(triangle))) = free.pop() {
-        let (count, tetrahedron) = beside[triangle as usize];
+        let (count, tetrahedron) = adjacent[triangle as usize];
         // Its tetrahedron may have been opened through another triangle meanwhile.
         if count != 1 {
             continue;
@@ -184,7 +184,7 @@ fn collapse(
         left_out[triangle as usize] = true;
         is_open[tetrahedron as usize] = false;
         for side in tetrahedra[tetrahedron as usize] {
-            let (count, all) = &mut beside[side as usize];
+            let (count, all) = &mut adjacent[side as usize];
             *count -= 1;
             *all ^= tetrahedron;
             if *count == 1 {
@@ -239,12 +239,12 @@ fn without_common(a: &[(u8, u32)], b: &[(u8, u32)]) -> Vec<(u8, u32)> {
     sum
 }
 
-/// Bytes for each voxel of a result: its neighbours, its ball while it is moved, what is returned.
+/// Bytes for each voxel of a result: its neighbours, its ball during the moves, its part of the result.
 const PER_VOXEL: f64 = 450.0;
 /// Bytes for each edge, triangle and tetrahedron, in vectors that grow.
 const PER_SIMPLEX: [f64; 3] = [16.0, 50.0, 40.0];
 
-/// Resident bytes for each byte in use: what is freed on the way does not all go back.
+/// Resident bytes for each byte in use: freed memory does not all return to the system.
 const RESIDENT: f64 = 1.75;
 
 impl Solid<'_> {

@@ -287,7 +287,7 @@ impl Solid<'_> {
             .iter()
             .map(|voxel| Ball::new(grid.centre(voxel.place), f64::from(voxel.distance)))
             .collect();
-        // Without voxels everything is lost, which has a message of its own.
+        // Without voxels everything is lost, which has a separate message.
         let union = MedialUnion::of_spheres(&balls).ok()?;
         let places = self.surface_points();
         let distances = union.signed_batch(&places);
@@ -452,7 +452,7 @@ pub(super) fn published<'s>(
 // 2. Too few: finer lattices are tried, each at most twice as fine as the one before, until one has
 //    the count, memory or effort ends, or finer lattices bring no more voxels.
 // 3. Too many: the search ends with a lattice that has the topology of the base, loses no more of the
-//    surface, and has a few more voxels than asked. Where either is lost, the next one lies half way
+//    surface, and has a few more voxels than requested. Where either is lost, the next one lies half way
 //    to the coarsest lattice that has both.
 // 4. The rest is deleted, simple voxels of the largest flux first.
 //

@@ -30,7 +30,7 @@
 //! # The queue
 //! Keys are rounded to one of 65,536 steps of their range, far finer than the sampling error of a
 //! flux. Places of the same step leave in the order in which they came. So a plateau of equal keys is
-//! peeled layer by layer from all sides, whatever its position in the lattice.
+//! peeled layer by layer from all sides, independent of its position in the lattice.
 
 use std::collections::{BTreeMap, VecDeque};
 

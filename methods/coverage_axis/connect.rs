@@ -19,13 +19,13 @@ use crate::Result;
 /// Added to the length of every edge, as in the authors' code, so that none is 0.
 const LEAST_LENGTH: f64 = 1e-12;
 
-/// Nobody's vertex.
-const NOBODY: u32 = u32::MAX;
+/// In place of the anchor of a vertex that none reaches.
+const NO_ANCHOR: u32 = u32::MAX;
 
 /// A distance that orders by its value: none is negative, so that the bits ascend with it.
 type Length = u64;
 
-/// The complex of the spheres chosen, in their order. `anchors` are the vertices where they stand, each once.
+/// The complex of the spheres chosen, in their order. `anchors` are their vertices, each once.
 ///
 /// # Errors
 /// When a sphere is not valid.
@@ -39,12 +39,12 @@ pub(super) fn by_regions(
     diagnostics: &mut Diagnostics,
 ) -> Result<MedialMesh> {
     let anchor_of = regions(initial, anchors);
-    let lost = anchor_of.iter().filter(|&&anchor| anchor == NOBODY).count();
+    let lost = anchor_of.iter().filter(|&&anchor| anchor == NO_ANCHOR).count();
     diagnostics.count("vertices_that_no_anchor_reaches", lost);
     if lost > 0 {
         diagnostics.warn(format!(
-            "{lost} vertices of the initial medial mesh are in parts without a sphere: these parts are \
-             lost; more samples would find them"
+            "parts of the initial medial mesh without a sphere were lost ({lost} vertices); use more \
+             samples"
         ));
     }
     let edges = initial.edges.iter().map(|edge| edge.map(|v| anchor_of[v as usize]));
@@ -64,8 +64,8 @@ pub(super) fn anchors(initial: &MedialMesh, chosen: &[Sphere]) -> Result<(Vec<u3
     let vertices = initial.spheres.len();
     if chosen.len() > vertices {
         return Err(SimplifyError::unsupported(format!(
-            "{} spheres are to be connected on an initial medial mesh of {vertices}: ask for fewer, or \
-             for more samples",
+            "{} spheres: too many to connect on an initial medial mesh of {vertices}; request fewer, or \
+             use more samples",
             chosen.len()
         )));
     }
@@ -109,12 +109,12 @@ fn nearest_free(
     }
 }
 
-/// The place in `anchors` of the nearest one along edges, for every vertex; [`NOBODY`] where none is
+/// The place in `anchors` of the nearest one along edges, for every vertex; [`NO_ANCHOR`] where none is
 /// connected. Of equal distances the smaller place.
 pub(super) fn regions(initial: &MedialMesh, anchors: &[u32]) -> Vec<u32> {
     let count = initial.spheres.len();
     let (start, neighbours) = adjacency(&initial.edges, count);
-    let mut reached: Vec<(f64, u32)> = vec![(f64::INFINITY, NOBODY); count];
+    let mut reached: Vec<(f64, u32)> = vec![(f64::INFINITY, NO_ANCHOR); count];
     let mut heap = BinaryHeap::new();
     for (label, &vertex) in anchors.iter().enumerate() {
         reached[vertex as usize] = (0.0, label as u32);

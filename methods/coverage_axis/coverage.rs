@@ -143,7 +143,7 @@ pub(super) struct Picks {
 /// Weights and penalty of the score.
 pub(super) struct Score {
     uniformity: f64,
-    /// What a candidate's radius costs it, with its weight.
+    /// The penalty for a candidate's radius, with its weight.
     penalties: Vec<f64>,
 }
 
@@ -167,7 +167,7 @@ impl Score {
 /// Takes candidates until everything that can be covered is, or `limit` are taken.
 ///
 /// In every step all candidates are scored: the number of uncovered samples that they cover plus their
-/// distance to what is chosen, each standardised over all candidates, less the penalty. A candidate is
+/// distance to the chosen candidates, each standardised over all candidates, less the penalty. A candidate is
 /// taken once; of equal scores the first wins.
 ///
 /// # Cost

@@ -32,11 +32,11 @@ pub(super) struct Cover {
     pub nodes: usize,
     /// Samples that no candidate covers.
     pub uncoverable: usize,
-    /// What ended the search.
+    /// The end of the search.
     pub end: End,
 }
 
-/// What ends a search for a smallest cover.
+/// The end of a search for a smallest cover.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum End {
     /// The solver: nothing better is left, but for its rounding.
@@ -51,7 +51,7 @@ pub(super) enum End {
 /// A smallest cover of all samples that can be covered, or the best that the limits allow.
 ///
 /// # Errors
-/// When what the reductions leave is too large, or the solver fails.
+/// When the reduced problem is too large, or the solver fails.
 pub(super) fn cover(
     coverage: &Coverage,
     params: &CoverageAxisParams,
@@ -63,8 +63,8 @@ pub(super) fn cover(
     let entries: usize = reduced.rows.iter().map(Vec::len).sum();
     if entries > MOST_ENTRIES {
         return Err(SimplifyError::unsupported(format!(
-            "{} balls and {} samples are left after all reductions, {entries} entries: too many for an \
-             exact cover; take select=greedy, fewer samples or a smaller dilation",
+            "{} balls and {} samples remain after all reductions, with {entries} entries: too many for an \
+             exact cover; use select=greedy, fewer samples or a smaller dilation",
             reduced.balls.len(),
             reduced.rows.len(),
         )));
@@ -78,7 +78,7 @@ pub(super) fn cover(
     Ok(Cover { reduced: [reduced.balls.len(), reduced.rows.len()], uncoverable, ..found })
 }
 
-/// What the reductions left to choose.
+/// The choices that the reductions leave.
 fn solve(reduced: &Reduced, params: &CoverageAxisParams, run: &RunContext) -> Result<Cover> {
     if reduced.rows.is_empty() {
         return Ok(Cover::default());
@@ -110,7 +110,7 @@ fn solve(reduced: &Reduced, params: &CoverageAxisParams, run: &RunContext) -> Re
     let mut rows = reduced.rows.iter();
     let covers = rows.all(|row| row.iter().any(|ball| places.binary_search(ball).is_ok()));
     if places.len() > first.len() || !covers {
-        // Rounding may cost the solver's answer a row; the cover that it began with has all.
+        // Rounding may leave a row of the solver's cover uncovered; the initial cover has all.
         places = first;
     }
     // The least whole number that rounding leaves possible; one ball is always needed.
@@ -155,7 +155,7 @@ fn search(
 }
 
 fn failed(error: microlp::Error) -> SimplifyError {
-    SimplifyError::unsupported(format!("the solver of the set cover gave up: {error}"))
+    SimplifyError::unsupported(format!("the solver of the set cover failed: {error}"))
 }
 
 /// `None` without a limit.
@@ -166,8 +166,7 @@ fn time_left(params: &CoverageAxisParams, began: Instant) -> Option<Duration> {
     }
 }
 
-/// A cover to begin with: the ball that covers most of what is left, again and again. Places in
-/// [`Reduced::balls`], ascending.
+/// A first cover: repeatedly the ball that covers most of the rest. Places in [`Reduced::balls`], ascending.
 pub(super) fn largest_first(reduced: &Reduced) -> Vec<u32> {
     let mut rows_of: Vec<Vec<u32>> = vec![Vec::new(); reduced.balls.len()];
     for (row, balls) in reduced.rows.iter().enumerate() {
@@ -197,7 +196,7 @@ pub(super) fn largest_first(reduced: &Reduced) -> Vec<u32> {
 //
 // Again, until nothing changes.
 
-/// What is left of a set cover, and what is decided.
+/// A reduced set cover, and the decided balls.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Reduced {
     /// Balls of every smallest cover that is sought.
@@ -208,7 +207,7 @@ pub(super) struct Reduced {
     pub rows: Vec<Vec<u32>>,
 }
 
-/// A set cover under reduction: what is left is marked in both directions of the matrix.
+/// A set cover under reduction: the rest is marked in both directions of the matrix.
 struct State {
     /// A row for each ball, restricted to the samples left.
     samples_of: Vec<Vec<u64>>,
@@ -236,7 +235,7 @@ impl State {
     fn force(&mut self) -> bool {
         let mut changed = false;
         for sample in 0..self.balls_of.len() {
-            // Its own ball may have been taken for a sample before.
+            // Its own ball may have been taken for an earlier sample.
             if size(&self.balls_of[sample]) != 1 {
                 continue;
             }
@@ -276,7 +275,7 @@ impl State {
             let left = (0..rows.len() as u32).filter(|&row| size(&rows[row as usize]) > 0);
             left.collect::<Vec<u32>>()
         });
-        // The solver's answer depends on the order of its columns.
+        // The solver's result depends on the order of its columns.
         balls.sort_by_key(|&ball| (usize::MAX - size(&self.samples_of[ball as usize]), ball));
         let mut place = vec![0; self.samples_of.len()];
         balls.iter().enumerate().for_each(|(at, &ball)| place[ball as usize] = at as u32);
@@ -301,8 +300,8 @@ enum Order {
 fn dominated(rows: &[Vec<u64>], columns: &[Vec<u64>], order: Order) -> Vec<usize> {
     let sizes: Vec<usize> = rows.par_iter().map(|row| size(row)).collect();
     let column_sizes: Vec<usize> = columns.par_iter().map(|column| size(column)).collect();
-    // A total order, so that of equal rows one stays, and all rows can be judged at once: what is
-    // dropped for a row that is dropped itself is needless beside that which makes both so.
+    // A total order, so that of equal rows one stays, and all rows can be tested at once: a row that is needless due
+    // to a dropped row is needless also due to the row that makes both so.
     let needless = (0..rows.len()).into_par_iter().filter(|&row| match order {
         _ if sizes[row] == 0 => false,
         // A row that contains this one has all of its columns: the rarest has the fewest rows.

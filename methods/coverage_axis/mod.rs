@@ -5,12 +5,12 @@
 //! Z. Wang, Z. Dou, R. Xu, C. Lin, Y. Liu, X. Long, S. Xin, T. Komura, X. Yuan, W. Wang 2024, *Coverage
 //! Axis++: Efficient Inner Point Selection for 3D Shape Skeletonization*, Computer Graphics Forum 43(5),
 //! <https://doi.org/10.1111/cgf.15143>. The formulas are those of the authors' public programs; of the
-//! papers only the abstracts were at hand.
+//! papers only the abstracts were available.
 //!
 //! 1. Samples of the surface are to be covered; candidates are spheres inside (this file).
 //! 2. A ball inflated by `delta` covers the samples that it contains (`coverage.rs`).
 //! 3. Coverage Axis takes a smallest set of balls that covers all samples (`exact.rs`);
-//!    Coverage Axis++ one ball after the other, by what it covers, how far it is from those chosen, and
+//!    Coverage Axis++ one ball after the other, by its cover, its distance to those chosen, and
 //!    how small it is (`coverage.rs`).
 //! 4. The spheres chosen, with the radii that they had, are connected (`connect.rs`).
 //!
@@ -26,7 +26,7 @@
 //! - A value that is the same for all candidates scores 0; a candidate is taken once.
 //! - Candidates with a radius below `1e-9` diagonals are dropped: their penalty has no bound.
 //! - Of equal distances to two anchors the one chosen first wins.
-//! - The topology of the result is not guaranteed; nothing is mended, and the judge tells the Betti numbers.
+//! - The topology of the result is not guaranteed. Nothing is repaired, and the evaluation reports the Betti numbers.
 //!
 //! # Deviations from the programs
 //!
@@ -39,7 +39,7 @@
 //!   `size=dilation` and for exact covers, it is met by a search on `delta`.
 //! - The exact cover is sought by another solver than the authors', after reductions that keep the
 //!   optimum. Smallest covers are not unique, so the spheres are others; their number is the same where
-//!   the search ends with a proof, which the counts `cover_bound` and `spheres` tell.
+//!   the search ends with a proof, which the counts `cover_bound` and `spheres` show.
 
 mod connect;
 mod coverage;
@@ -82,7 +82,7 @@ pub struct CoverageAxis {
 
 /// Coverage Axis and Coverage Axis++ as a method, with the collapse for `connection=qmat`.
 ///
-/// Answers all levels but an error bound. Memory: one bit for each candidate and sample.
+/// Supports all levels but an error bound. Memory: one bit for each candidate and sample.
 pub fn method(keeping: Keeping) -> CoverageAxis {
     let info = MethodInfo::new("coverage-axis", "Coverage Axis++")
         .citation(
@@ -174,7 +174,7 @@ impl Simplification for PreparedCoverage {
 }
 
 impl Axis {
-    /// Steps 2 to 4, with at most so many spheres where they have an order.
+    /// Steps 2 to 4, with at most `most` spheres where they have an order.
     fn at(&self, dilation: f64, most: usize) -> Result<Probe> {
         let Instance { samples, spheres, too_small, side, .. } = &self.instance;
         let coverage = Coverage::new(samples, spheres, dilation * side);
@@ -188,7 +188,7 @@ impl Axis {
         };
         if chosen.is_empty() {
             return Err(SimplifyError::unsupported(format!(
-                "no candidate covers a sample at delta = {dilation}: take a larger dilation, or denser \
+                "no candidate covers a sample at delta = {dilation}: use a larger dilation, or denser \
                  samples of the shape"
             )));
         }
@@ -209,7 +209,7 @@ impl Axis {
         if picks.uncovered > 0 {
             let percent = 100.0 * picks.uncovered as f64 / coverage.columns() as f64;
             diagnostics.warn(format!(
-                "{} spheres leave {} of {} samples uncovered, {percent:.1} %",
+                "{} spheres leave {} of {} samples uncovered ({percent:.1} %)",
                 picks.chosen.len(),
                 picks.uncovered,
                 coverage.columns()
@@ -271,8 +271,8 @@ impl Axis {
 fn warn_of_uncoverable(uncoverable: usize, diagnostics: &mut Diagnostics) {
     if uncoverable > 0 {
         diagnostics.warn(format!(
-            "{uncoverable} samples are covered by no candidate and were left out: a larger dilation or \
-             denser samples of the shape would cover them"
+            "{uncoverable} samples that no candidate covers were left out; use a larger dilation or \
+             denser samples of the shape"
         ));
     }
 }
@@ -356,7 +356,7 @@ pub enum Size {
     /// The first spheres of the greedy choice; where fewer cover everything, and for the exact choice,
     /// which has no order, a search on the dilation.
     Picks,
-    /// A search on the dilation, until so many cover everything.
+    /// A search on the dilation, until the requested number of spheres covers all samples.
     Dilation,
 }
 
@@ -394,10 +394,10 @@ impl CoverageAxisParams {
 /// Balls below this radius, in diagonals, are dropped: their penalty would be without bound.
 const LEAST_RADIUS: f64 = 1e-9;
 
-/// Keeps the random points apart from the samples, which come of the same seed.
+/// Keeps the random points apart from the samples, which have the same seed.
 const STREAM: u64 = 0x636f_7665_7261_6765;
 
-/// What a cover is made of, in normalised units.
+/// The input of a cover, in normalised units.
 struct Instance {
     /// Samples of the surface.
     pub samples: Vec<Vec3>,
@@ -433,7 +433,7 @@ impl Instance {
         let (all, too_small) = (all.len(), all.len() - spheres.len());
         if spheres.is_empty() {
             return Err(SimplifyError::unsupported(format!(
-                "none of {all} candidates inside has a radius of {LEAST_RADIUS} diagonals or more"
+                "no candidate inside has a radius of {LEAST_RADIUS} diagonals or more (found {all} candidates)"
             )));
         }
         let vertices = (params.candidates == Candidates::Voronoi).then_some(places);
@@ -441,7 +441,7 @@ impl Instance {
     }
 }
 
-/// Points inside, of so many in the bounding box, with their distances to the surface.
+/// The points inside, among random ones in the bounding box, with their distances to the surface.
 fn random(
     shape: &Shape,
     (low, high): (Vec3, Vec3),

@@ -122,7 +122,7 @@ fn the_greedy_choice_is_that_of_the_formula() {
 }
 
 #[test]
-fn what_nobody_covers_ends_no_choice_and_fills_none() {
+fn uncoverable_samples_do_not_stop_a_choice() {
     let balls =
         [Sphere::new(Vec3::ZERO, 1.0), Sphere::new(Vec3::X, 1.0), Sphere::new(Vec3::Y, 1.0)];
     let samples = [Vec3::new(0.5, 0.0, 0.0), Vec3::splat(40.0), Vec3::splat(50.0)];
@@ -204,7 +204,7 @@ fn a_cylinder_takes_as_many_as_their_rings_are_wide() {
         let cover = exact_cover(&Coverage::new(&samples, &balls, delta));
         let found = cover.chosen.len();
         assert_eq!(cover.bound, found);
-        // Samples are fewer than points, and candidates stand on a grid: one more or less.
+        // Samples are fewer than points, and candidates are on a grid: one more or less.
         assert!(found.abs_diff(fewest) <= 1, "{delta}: {found} for {fewest}");
     }
 }
@@ -258,7 +258,7 @@ fn regions_are_those_of_the_nearest_anchor_along_edges() {
 }
 
 #[test]
-fn two_spheres_on_one_vertex_are_told_apart_and_too_many_refused() {
+fn two_spheres_on_one_vertex_are_separated_and_too_many_rejected() {
     let balls = [Vec3::ZERO, Vec3::X, 3.0 * Vec3::X].map(|c| Sphere::new(c, 0.5)).to_vec();
     let initial = MedialMesh::from_simplices(balls, vec![[0, 1], [1, 2]], vec![]).unwrap();
     let near = [0.1, 0.2, 0.3].map(|x| Sphere::new(x * Vec3::X, 0.5));
@@ -280,7 +280,7 @@ fn both_connections_keep_the_spheres_chosen() {
             all.sort_unstable();
             all
         };
-        // Collapses may be held back, and then leave others beside them.
+        // Collapses may be rejected, and then leave further vertices.
         let after = sorted(&kept);
         assert!(sorted(&regions).iter().all(|ball| after.binary_search(ball).is_ok()), "{id}");
         assert_eq!(betti(&kept), betti(&shape.initial().unwrap()), "{id}");

@@ -11,7 +11,7 @@ use wide::u32x4;
 const CHUNK: u32 = 1024;
 
 /// A sample's number in the order of first cells: samples close in the triangulation are then close
-/// in memory, whatever the order of the input.
+/// in memory, for any order of the input.
 pub(super) type Place = u32;
 
 /// The umbrellas of all samples: about `p` the Delaunay triangles whose dual Voronoi edge has its
@@ -24,7 +24,7 @@ pub(super) struct Umbrellas {
     start: Vec<u32>,
     /// Unit normals, of either sign.
     normals: Vec<Vec3>,
-    /// The corners beside the sample.
+    /// The corners next to the sample.
     rims: Vec<[Place; 2]>,
     /// Largest circumradius about each sample.
     largest: Vec<f64>,
@@ -207,13 +207,13 @@ fn with_poles(
 /// The corners of a cell as places. [`AHEAD`] is set for a corner if the cell's Voronoi vertex is on
 /// the side of the corner's pole. The Voronoi edge between two cells crosses the plane of a common
 /// corner if and only if their numbers for it differ in that bit. Four lanes compare this at once,
-/// whatever the order of the corners.
+/// for any order of the corners.
 type Sides = [u32; 4];
 
 /// All places are smaller than this bit.
 const AHEAD: u32 = 1 << 31;
 
-/// Stands for the vertex at infinity, and for the corners of a cell whose Voronoi vertex is not
+/// Represents the vertex at infinity, and the corners of a cell whose Voronoi vertex is not
 /// representable.
 const NO_CORNER: u32 = AHEAD - 2;
 

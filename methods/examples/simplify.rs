@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [mesh, spheres, output] = words.as_slice() else {
         return Err("usage: simplify MESH SPHERES OUTPUT.ma".into());
     };
-    // Closed, manifold, oriented; whatever was repaired on the way is in the report.
+    // Closed, manifold, oriented; the report lists the repairs.
     let loaded = surface::read(mesh)?;
     // From here on lengths are fractions of the bounding box's diagonal.
     let shape = Shape::new(mesh, &loaded.mesh, loaded.report, ShapeOptions::default())?;

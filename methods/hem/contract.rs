@@ -59,7 +59,7 @@ struct Tally {
     held_by_inversion: usize,
 }
 
-/// What a collapse removes, as it was before.
+/// The state before a collapse of everything that it removes.
 struct Change {
     kept: u32,
     removed: u32,
@@ -105,7 +105,7 @@ impl Contraction {
                 (evaluated.collect(), star.distances)
             })
             .collect();
-        // Jobs come back in order, so candidates line up with edges whatever the threads did.
+        // Jobs come back in order, so candidates line up with edges for any thread order.
         let edges = jobs.iter().flat_map(|(edges, _)| edges);
         let candidates = all
             .iter()
@@ -128,7 +128,7 @@ impl Contraction {
         self.edges.get(&ends).copied()
     }
 
-    /// Steps 2 to 4, until told to stop or no edge may be collapsed.
+    /// Steps 2 to 4, until `stop`, or until no edge may be collapsed.
     pub(super) fn run_to(&mut self, stop: Stop, run: &RunContext) -> Result<()> {
         let target = if let Stop::Spheres(target) = stop { target } else { 1 };
         let bound = if let Stop::Error(bound) = stop { bound } else { f64::INFINITY };
@@ -187,7 +187,7 @@ impl Contraction {
         self.edges.insert(ends, edge);
     }
 
-    /// Tests the topology for the edge and the inversion for each direction; bars what fails.
+    /// Tests the topology for the edge and the inversion for each direction; bars those that fail.
     fn bar(&mut self, ends: [u32; 2], edge: &mut Edge) {
         let [a, b] = ends;
         edge.tested = true;
@@ -237,13 +237,13 @@ impl Contraction {
                 let other = self.complex.neighbours(v)[index];
                 // An edge between two neighbours of the removed vertex is renewed once.
                 if other != kept && (v < other || change.around.binary_search(&other).is_err()) {
-                    self.renew_beside(&change, [v, other]);
+                    self.renew_around(&change, [v, other]);
                 }
             }
         }
     }
 
-    /// Collects what a collapse changes, and forgets the edges of the removed vertex.
+    /// Collects the changes of a collapse, and forgets the edges of the removed vertex.
     fn take_apart(&mut self, kept: u32, removed: u32) -> Change {
         let mut around = self.complex.neighbours(removed).to_vec();
         around.retain(|&v| v != kept);
@@ -283,7 +283,7 @@ impl Contraction {
 
     /// Renews another edge of a neighbour of the removed vertex: in the simplices of its star the
     /// survivor has replaced the removed vertex.
-    fn renew_beside(&mut self, change: &Change, [v, other]: [u32; 2]) {
+    fn renew_around(&mut self, change: &Change, [v, other]: [u32; 2]) {
         let Self { complex, samples, edges, queue, star, inside, .. } = self;
         let ground = Ground { complex, samples, inside: *inside };
         let ends = ascending(v, other);
@@ -304,7 +304,7 @@ impl Contraction {
     pub(super) fn why_stopped(&mut self) -> String {
         let edges: Vec<_> = self.complex.edges().collect();
         if edges.is_empty() {
-            return "no edge is left, each sphere is a component of its own".to_owned();
+            return "no edge is left, each sphere is a separate component".to_owned();
         }
         let by_topology = edges.iter().filter(|&&ends| self.is_blocked(ends)).count();
         let by_inversion = edges.len() - by_topology;

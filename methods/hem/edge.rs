@@ -13,7 +13,7 @@
 //! - `s < 0`: if the primitive that holds the witness is still there, the witness is at least as deep
 //!   as before. Otherwise nothing is known, and the bound is 0.
 //! - With [`Inside::Surface`], the new least distance to a surface is at least the smallest of the old
-//!   one and the distances to the added primitives, whatever was removed.
+//!   one and the distances to the added primitives, for any removal.
 //!
 //! An added primitive whose balls have no excess in the direction from the old nearest primitive
 //! to the witness cannot be nearer (below), so most are not even built.
@@ -147,7 +147,7 @@ impl Edge {
     }
 
     /// Updates the bounds after a nearby collapse. Primitives with the vertex `gone` left the star,
-    /// and `added` came: one link vertex stands for a cone, two for a slab and its rim. Exact errors
+    /// and `added` came: one link vertex denotes a cone, two denote a slab and its rim. Exact errors
     /// become bounds, barred directions are to be tested again. Returns the number of distances
     /// computed.
     pub(super) fn renew(
@@ -350,7 +350,7 @@ pub(super) struct Nearest {
     pub signed: f64,
     /// Centre of the interpolated sphere that attains it.
     centre: Vec3,
-    /// Its vertices beside the hub, in places of the link, or [`NONE`].
+    /// Its vertices except the hub, in places of the link, or [`NONE`].
     places: [u32; 2],
 }
 
@@ -419,7 +419,7 @@ impl Star {
         }
     }
 
-    /// Ids of the vertices of a primitive beside the hub; a missing one is [`u32::MAX`].
+    /// Ids of the vertices of a primitive except the hub; a missing one is [`u32::MAX`].
     pub(super) fn vertices(&self, nearest: &Nearest) -> [u32; 2] {
         nearest.places.map(|k| if k == NONE { NONE } else { self.link[k as usize] })
     }

@@ -21,7 +21,7 @@
 //! `sigma = min s` and `mu = min |s|` over a star or over the whole mesh ([`medial::complex::MedialUnion`]).
 //! Lengths are fractions of the bounding-box diagonal.
 //!
-//! # What the error is, and what it bounds
+//! # The error and its bound
 //!
 //! With `inside=depth`, the default, the error of a sample is `|sigma|`: outside the star its exact
 //! distance, inside its depth in the primitive that holds it deepest. With `inside=surface` it is
@@ -38,11 +38,11 @@
 //! - Edges are collapsed until the cheapest one costs more than the bound.
 //! - The error of every sample is measured against the whole union, with the same `inside`.
 //! - While it exceeds the bound, collapses are undone, in growing steps and then by bisection. The
-//!   count `taken_back_for_the_bound` says how many. The error is not monotone: if the initial mesh
+//!   count `taken_back_for_the_bound` has their number. The error is not monotone: if the initial mesh
 //!   exceeds the bound, coarser meshes may not. So some of them are measured before the bound is
 //!   refused; the message then names the best.
 //!
-//! *The bound is one-sided, at the samples.* It says how far each sample is from the union, not how far
+//! *The bound is one-sided, at the samples.* It limits how far each sample is from the union, not how far
 //! the union's boundary is from the surface: where primitives no longer fill the solid, the boundary
 //! runs deep inside the solid although every sample is near some primitive. `sides=both` also bounds
 //! the distance from the boundary of the union to the surface, at some 20,000 samples. The order of
@@ -133,9 +133,9 @@ const PUBLISHED: f64 = 1e-4;
 
 /// The HEM simplifier.
 ///
-/// Answers [`Level::Spheres`], and [`Level::Native`] with a bound that holds for every sample
-/// against the whole union: one-sided, unless the parameter `sides` asks for both directions. A
-/// request finer than the one before starts anew.
+/// Supports [`Level::Spheres`], and [`Level::Native`] with a bound that holds for every sample
+/// against the whole union: one-sided, unless the parameter `sides` selects both directions. A
+/// request finer than the one before starts again from the initial mesh.
 ///
 /// ```
 /// use medial::shape::{Shape, ShapeOptions};
@@ -297,8 +297,8 @@ impl PreparedHem {
         checked(Level::Published, mesh, Some(PUBLISHED), diagnostics)
     }
 
-    fn contract(&mut self, stop: Stop, anew: bool) -> Result<()> {
-        if anew {
+    fn contract(&mut self, stop: Stop, restart: bool) -> Result<()> {
+        if restart {
             self.contraction = Contraction::new(&self.initial, self.samples.clone(), self.params);
         }
         self.contraction.run_to(stop, &self.run)
@@ -501,7 +501,7 @@ pub(super) fn last_within(
 
 // The boundary samples that each sphere is responsible for.
 
-/// The boundary samples and for each sphere the ids of its own, each once, ascending.
+/// The boundary samples and for each sphere the ids of its samples, each once, ascending.
 ///
 /// A sample that several spheres touch is in several lists. The list of a sphere never loses a sample
 /// while the sphere exists, and the total length never grows.

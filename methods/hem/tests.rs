@@ -18,10 +18,10 @@ use super::{Inside, SampleLists, *};
 
 const READINGS: [Inside; 2] = [Inside::Depth, Inside::Surface];
 
-/// More than the distances can be rounded, and than what counts as no error.
+/// More than the rounding of distances, and than errors that count as zero.
 const CLOSE: f64 = 3e-12;
 
-/// What a random model is made of; simplices and lists with repetitions.
+/// The parts of a random model; simplices and lists with repetitions.
 type Parts =
     (Vec<([f64; 3], f64)>, Vec<Vec<u32>>, Vec<Vec<u32>>, Vec<[f64; 3]>, Vec<Vec<u32>>, bool);
 
@@ -81,7 +81,7 @@ fn assert_errors_agree(model: &Model, complex: &CollapseComplex, samples: &Sampl
     }
 }
 
-/// What the contraction knows of each edge is never above the truth, and the queue never later.
+/// The contraction's bounds never exceed the true errors, and the queue is never late.
 fn assert_bounds_hold(model: &Model, contraction: &Contraction) {
     let mut complex = CollapseComplex::from_mesh(&model.mesh());
     for ends in model.edges() {
@@ -133,7 +133,7 @@ fn follow(mut model: Model, checks_each: bool) -> usize {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
 
-    /// Full evaluation after random collapses, whatever they do to the topology.
+    /// Full evaluation after random collapses, with any change of topology.
     #[test]
     fn errors_are_those_of_the_oracle(
         parts in parts(), picks in prop::collection::vec((any::<prop::sample::Index>(), any::<bool>()), 0..7),

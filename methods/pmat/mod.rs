@@ -27,11 +27,11 @@
 //!   selects a prefix. Scales begin at 1: at `s = 1` every ball inside a larger one is gone.
 //! - Edges between equal radii have an infinite cost. They come last, the shortest first, so that no
 //!   edge is left at the end; no finite scale reaches them.
-//! - Centres closer than `1e-12` are one point: the cost is 0, whatever the radii.
+//! - Centres closer than `1e-12` are one point: the cost is 0 for all radii.
 //! - Equal costs are ordered by the smaller, then by the larger id; of two equal radii the smaller
 //!   id stays.
 //! - There is no published scale: Table 1 has scales between 1.18 and 17.38, picked by eye for each
-//!   shape. The published level is the least of them, `s = 1.18`, with a warning that says so. The end
+//!   shape. The published level is the least of them, `s = 1.18`, with a warning. The end
 //!   of the algorithm, when no edge is left, is `Level::Spheres(1)`. Every level comes with the whole
 //!   hierarchy.
 //!
@@ -123,7 +123,7 @@ impl Levels {
         Self { scales: scales.collect(), hierarchy }
     }
 
-    /// The number of collapses that a level asks for.
+    /// The number of collapses that a level requires.
     fn stage_of(&self, level: Level) -> Result<usize> {
         let scale = match some_spheres(level)? {
             Level::Spheres(count) => {
@@ -145,12 +145,12 @@ impl Levels {
         diagnostics.count("beyond_every_finite_scale", infinite);
         let spheres = self.hierarchy.initial().spheres.len();
         match level {
-            Level::Spheres(asked) if asked > spheres => diagnostics.warn(format!(
-                "{spheres} spheres instead of {asked}: the initial medial mesh has no more"
+            Level::Spheres(requested) if requested > spheres => diagnostics.warn(format!(
+                "{spheres} spheres instead of {requested}: the initial medial mesh has no more"
             )),
-            Level::Spheres(asked) if asked < spheres - stage => diagnostics.warn(format!(
-                "{} spheres instead of {asked}: no edge is left, each sphere is a component of its \
-                 own",
+            Level::Spheres(requested) if requested < spheres - stage => diagnostics.warn(format!(
+                "{} spheres instead of {requested}: no edge is left, each sphere is a separate \
+                 component",
                 spheres - stage
             )),
             Level::Published => diagnostics.warn(format!(
@@ -188,7 +188,7 @@ impl Simplification for Levels {
 // is gone, and only the edges that the survivor takes over must be queued. Faces do not affect the
 // order; they follow from it ([`medial::complex::collapse::Hierarchy`]).
 //
-// Each sphere has a list of neighbours. An entry may name a sphere that is gone; it stands for the
+// Each sphere has a list of neighbours. An entry may name a removed sphere; it then means the
 // sphere that absorbed it, found through a disjoint-set forest. A list is read once, when its sphere
 // is absorbed. Its remaining neighbours, each once, are then appended to the list of the survivor,
 // in the same memory. No other list is touched.
@@ -384,7 +384,7 @@ impl Graph {
             self.nodes[v as usize].met_by = removed;
         }
         self.nodes[removed as usize].parent = kept;
-        // The remaining neighbours overwrite what was read: writing never overtakes reading.
+        // The remaining neighbours overwrite read entries: writing never overtakes reading.
         let (mut target, mut written) = (removed, 0);
         let mut source = removed;
         while source != NONE {
@@ -422,7 +422,7 @@ impl Graph {
 
 /// The factor `c = |p_a - p_b| / |r_a - r_b|` (section 2): scaled by it, the larger of two spheres
 /// absorbs the smaller. At most 1 if one ball contains the other already; infinite for equal radii;
-/// 0, whatever the radii, for centres closer than [`ZERO_LENGTH`], which count as one point. Lengths
+/// 0 for all radii, for centres closer than [`ZERO_LENGTH`], which count as one point. Lengths
 /// are in units of the bounding-box diagonal.
 ///
 /// With the stability ratio `G` of the same edge, `G = max(0, 1 - 1 / c)`.

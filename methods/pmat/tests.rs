@@ -111,7 +111,7 @@ fn coincident_centres_cost_nothing_and_tangent_balls_one() {
     assert_eq!(absorption_scale(sphere(0.0, 0.5), sphere(0.25, 0.25)), 1.0);
     assert_eq!(absorption_scale(sphere(0.0, 0.5), sphere(0.25, 0.5)), f64::INFINITY);
     assert_eq!(absorption_scale(sphere(0.0, 0.5), sphere(2e-12, 0.5)), f64::INFINITY);
-    // Inside out: at s = 1 exactly what is in a larger ball is gone.
+    // Inside out: at s = 1 exactly the spheres inside a larger ball are gone.
     let spheres = vec![sphere(0.0, 1.0), sphere(0.5, 0.5), sphere(0.25, 0.5), sphere(0.75, 0.5)];
     let mesh = mesh_of(spheres, vec![[0, 1], [0, 2], [0, 3]], vec![]);
     let left = levels(&mesh).at(Level::Native(1.0)).expect("a level");
@@ -148,7 +148,7 @@ fn a_loop_may_close_and_is_counted() {
 
 #[test]
 fn large_stars_are_absorbed() {
-    // Hubs of ever larger radius, each with leaves of its own.
+    // Hubs of ever larger radius, each with its own leaves.
     let (hubs, leaves) = (40, 200);
     let mut spheres: Vec<_> =
         (0..hubs).map(|i| sphere(f64::from(i), 1.0 + 0.01 * f64::from(i))).collect();
@@ -228,7 +228,7 @@ proptest! {
         }
     }
 
-    /// The order of costs is that of the stability ratios of Q-MAT wherever these tell.
+    /// The order of costs is that of the stability ratios of Q-MAT wherever these differ.
     #[test]
     fn costs_order_as_stability_ratios(
         a in (prop::array::uniform3(-1.0..1.0f64), 0.0..1.0f64, 0.0..1.0f64),

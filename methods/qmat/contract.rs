@@ -66,7 +66,7 @@ impl Kept {
     }
 }
 
-/// Counts of what happened to popped candidates.
+/// Counts of popped candidates by outcome.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Tally {
     collapses: usize,
@@ -133,7 +133,7 @@ impl Contraction {
         Self::keeping(mesh, params, &[])
     }
 
-    /// As [`Contraction::new`]; some spheres stay as they are, and what is merged with one becomes it.
+    /// As [`Contraction::new`]; the `kept` spheres stay as they are, and a sphere merged with one becomes it.
     pub(super) fn keeping(mesh: &MedialMesh, params: QmatParams, kept: &[u32]) -> Self {
         let mut marks = vec![false; if kept.is_empty() { 0 } else { mesh.spheres.len() }];
         kept.iter().for_each(|&v| marks[v as usize] = true);
@@ -181,7 +181,7 @@ impl Contraction {
                 others.iter().fold(first, |kept, &v| self.merge([kept, v], sphere));
                 continue;
             };
-            // A candidate that is not collapsed goes back or is parked, so none is tried in vain.
+            // A candidate that is not collapsed goes back or is parked, so none is tried without need.
             match self.decide(cheapest) {
                 Decision::Collapse(sphere) => {
                     self.merge(cheapest.ends(), sphere);
@@ -208,7 +208,7 @@ impl Contraction {
         run.step(total, total)
     }
 
-    /// Steps 3 and 4: where the merged sphere goes, or what holds the edge back.
+    /// Steps 3 and 4: the place of the merged sphere, or the reason against the edge.
     fn decide(&mut self, candidate: Candidate) -> Decision {
         let [a, b] = candidate.ends();
         if self.keeps_topology() && !self.complex.keeps_homotopy(a, b) {
@@ -301,7 +301,7 @@ impl Contraction {
     pub(super) fn why_stopped(&mut self) -> String {
         let edges: Vec<_> = self.complex.edges().collect();
         if edges.is_empty() {
-            return "no edge is left, each sphere is a component of its own".to_owned();
+            return "no edge is left, each sphere is a separate component".to_owned();
         }
         let keeps_topology = self.keeps_topology();
         let (mut by_choice, mut by_topology, mut by_inversion) = (0, 0, 0);
@@ -316,7 +316,7 @@ impl Contraction {
         }
         let both_kept = match by_choice {
             0 => String::new(),
-            count => format!("; {count} join spheres that are to be kept"),
+            count => format!("; {count} join two kept spheres"),
         };
         format!(
             "the link condition holds back {by_topology} of the {} edges left, to keep the topology, \
@@ -431,7 +431,7 @@ impl Contraction {
     /// The cheapest edge whose collapse violates the link condition but not the topology of
     /// `initial`, else the first such cluster of coincident spheres. `None` when there is neither.
     pub(super) fn unlock(&mut self, initial: &MedialMesh) -> Option<Cluster> {
-        // A cluster may hold several spheres that are to be kept.
+        // A cluster may hold several kept spheres.
         let is_tied = !self.kept.0.is_empty() || !self.keeps_topology();
         if is_tied || self.complex.sphere_count() > MAX_UNLOCKED_SPHERES {
             return None;
@@ -451,7 +451,7 @@ impl Contraction {
         };
         let edges = self.sorted_candidates().into_iter().filter_map(|candidate| {
             let [first, other] = candidate.ends();
-            let sphere = self.placement_whatever_the_topology(candidate)?;
+            let sphere = self.placement_without_topology(candidate)?;
             Some(Cluster { first, others: vec![other], sphere })
         });
         edges.chain(self.coincident_clusters()).find(keeps)
@@ -488,11 +488,11 @@ impl Contraction {
     }
 
     /// The placement of the merged sphere of an edge; `None` if each folds a face over.
-    fn placement_whatever_the_topology(&self, candidate: Candidate) -> Option<Sphere> {
+    fn placement_without_topology(&self, candidate: Candidate) -> Option<Sphere> {
         match self.place(candidate) {
             Decision::Collapse(sphere) => Some(sphere),
             // Ends: at the cost of its placement the candidate is not postponed again.
-            Decision::Postpone(dearer) => self.placement_whatever_the_topology(dearer),
+            Decision::Postpone(dearer) => self.placement_without_topology(dearer),
             Decision::Hold(_) | Decision::Fold(_) => None,
         }
     }

@@ -37,15 +37,15 @@
 //!
 //! - The topology is kept from the first collapse on (`topology_from=all`, the meaning of `auto` at
 //!   every level but the published one). The paper checks only once `η = 200` spheres are left, which
-//!   saves time but leaves what earlier collapses broke. With
+//!   saves time but leaves the defects of earlier collapses. With
 //!   `topology_from=200` the results of 1,000 spheres have wrong Betti numbers on seven of the twelve
 //!   shared meshes; with checks from the start, on none whose initial mesh has the right ones.
-//!   [`Level::Published`] checks from 200 spheres on unless told otherwise.
+//!   [`Level::Published`] checks from 200 spheres on by default.
 //! - If the optimum of an edge folds a face over, section 4.6 collapses the edge at once at the best
 //!   other placement, which costs more than the edge was queued at. Here the edge goes back into the
 //!   queue at that cost, and is collapsed when nothing cheaper is left.
 //! - An edge that the link condition or the folding test rejects is tried again once a collapse
-//!   changes the vertices that held it back. The paper says of the folding test only that the edge
+//!   changes the vertices that held it back. The paper states of the folding test only that the edge
 //!   "will not be collapsed".
 //! - The link condition is that of Dey et al. in full, for holes and for voids, after elementary
 //!   expansions ([`keeps_homotopy`](medial::complex::collapse::CollapseComplex::keeps_homotopy)): a
@@ -83,7 +83,7 @@ const PUBLISHED: usize = 100;
 
 /// The Q-MAT simplifier.
 ///
-/// Answers [`Level::Spheres`]; a request finer than the one before starts anew. Cost
+/// Supports [`Level::Spheres`]; a request finer than the one before starts again. Cost
 /// `O(n log n)` for an initial mesh of bounded degree.
 pub fn method() -> Method<QmatParams> {
     let info = MethodInfo::new("qmat", "Q-MAT")
@@ -106,7 +106,7 @@ pub fn method() -> Method<QmatParams> {
     Method::new(info, prepare)
 }
 
-/// Collapses a medial mesh to `target` spheres by Q-MAT's defaults, and spares those in `kept`: what is
+/// Collapses a medial mesh to `target` spheres by Q-MAT's defaults, and spares those in `kept`: a sphere
 /// merged with one becomes it, and two of them are never merged. This connects spheres that another
 /// method has chosen; it is mode 2 of the public program Net-Maker/QMAT.
 ///
@@ -165,7 +165,7 @@ impl Simplification for PreparedQmat {
                 PUBLISHED
             }
             Level::Native(_) => {
-                let why = "Q-MAT has no scalar of its own; ask for a number of spheres";
+                let why = "Q-MAT has no native level; request a number of spheres, such as 100";
                 return Err(SimplifyError::unsupported(why));
             }
         };
@@ -181,7 +181,7 @@ impl Simplification for PreparedQmat {
         }
         let params = self.params.at(level);
         let is_of_other = self.contraction.params != params;
-        // Collapses are not undone, so a finer level starts anew.
+        // Collapses are not undone, so a finer level starts again.
         if is_of_other || self.contraction.complex.sphere_count() < target {
             self.contraction = Contraction::new(&self.initial, params);
         }
@@ -254,7 +254,7 @@ pub enum TopologyFrom {
 }
 
 impl TopologyFrom {
-    /// Whether a collapse has to keep the topology when so many spheres are left.
+    /// Whether a collapse has to keep the topology when `spheres` are left.
     pub fn applies(self, spheres: usize) -> bool {
         match self {
             Self::Auto | Self::All => true,

@@ -183,7 +183,7 @@ proptest! {
         prop_assert!(same_spheres(&here.transformed(1.0, motion), &there));
     }
 
-    /// With the link condition from the start no Betti number changes, whatever the complex.
+    /// With the link condition from the start no Betti number changes, for any complex.
     #[test]
     fn random_complexes_keep_their_betti_numbers(
         points in prop::collection::vec((prop::array::uniform3(0.0..1.0f64), 0.0..0.3f64), 12),
@@ -204,7 +204,7 @@ proptest! {
     }
 }
 
-/// Follows the contraction to its end beside the oracle; the number of fallbacks, and of collapses.
+/// Follows the contraction and the oracle to the end; the number of fallbacks, and of collapses.
 fn follow(mesh: &MedialMesh, params: QmatParams) -> [usize; 3] {
     let mut oracle = Oracle::new(mesh, params);
     let mut contraction = Contraction::new(mesh, params);
@@ -227,7 +227,7 @@ fn follow(mesh: &MedialMesh, params: QmatParams) -> [usize; 3] {
         let complex = &contraction.complex;
         assert_eq!([complex.edge_count(), complex.face_count()], oracle.sizes());
     }
-    // Nothing is left but what only Betti numbers allow.
+    // Only edges that Betti numbers alone allow are left.
     let (left, unlocked) = (contraction.complex.sphere_count(), contraction.tally.unlocked);
     contraction.run_to(mesh, 1, &RunContext::default()).unwrap();
     assert!(contraction.complex.sphere_count() == left || contraction.tally.unlocked > unlocked);
@@ -270,7 +270,7 @@ fn order_placement_and_fallback_are_those_of_the_paper_by_brute_force() {
 
 // ----------------------------------------------------------------------------
 // Quadrics against their definition, and the singularity test against eigenvalues. Those of slabs, cones
-// and boundaries are compared by what they lead to, with the oracle below.
+// and boundaries are compared by their results, with the oracle below.
 
 fn vector() -> impl Strategy<Value = Vec3> {
     prop::array::uniform3(-1.0..1.0f64).prop_map(Vec3::from)
@@ -333,9 +333,9 @@ proptest! {
 // ----------------------------------------------------------------------------
 // Q-MAT as the paper writes it, with sets, full matrices and no queue: the oracle of the tests.
 //
-// Every step prices what changed, tries all edges in order and takes the first that may be
-// collapsed. It shares with the method the link condition, which has an oracle of its own, and the
-// documented rules beside the paper: ties, and what replaces a minimiser.
+// Every step prices the changes, tries all edges in order and takes the first that may be
+// collapsed. It shares with the method the link condition, tested by a separate oracle, and the documented rules
+// outside the paper: ties, and the replacement of a minimiser.
 
 /// A point of `R^4`: centre and radius.
 type Point = [f64; 4];
@@ -350,7 +350,7 @@ struct Error {
     c: f64,
 }
 
-/// What the oracle would do with an edge.
+/// The oracle's decision on an edge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Choice {
     pub ends: [u32; 2],
@@ -359,7 +359,7 @@ pub(super) struct Choice {
     pub is_fallback: bool,
 }
 
-/// A complex with what the paper keeps of it.
+/// A complex with the paper's state.
 pub(super) struct Oracle {
     params: QmatParams,
     spheres: Vec<Sphere>,

@@ -28,10 +28,10 @@
 //! - Step 6 undoes neither part of step 2: a result at scale 1 is 0.2 % larger than the union of
 //!   polar balls, and its centres keep the jitter, by which results of different seeds differ. As far as
 //!   we know the authors' tool does not undo it either. Without step 2 (`radius_factor=1`, `jitter=0`)
-//!   rounding decides which polar balls meet at scale 1, and the result is torn; a warning says so.
-//! - The authors choose the density of the samples, `delta`, beside `s`; with `size=density` a number of
+//!   rounding decides which polar balls meet at scale 1, and the result is torn, which a warning reports.
+//! - The authors choose the density of the samples, `delta`, and `s`; with `size=density` a number of
 //!   spheres is met by the number of samples at `s` = 1.1 (`methods/levels.rs`). Each count then
-//!   has balls of its own.
+//!   has separate balls.
 //! - By default a number of spheres is met by a search on `s`. Not every count occurs: the result is the
 //!   largest count met that does not exceed the request; a count within 1 % ends the search. The seconds
 //!   of a request are those of all scales that it tried.
@@ -248,7 +248,7 @@ const STALL: (usize, f64) = (3, 0.03);
 /// Scales that are tried between two of these steps.
 const MAX_TRIES: usize = 8;
 
-/// A count within this fraction below the one asked ends the search.
+/// A count within this fraction below the requested one ends the search.
 const TOLERANCE: f64 = 0.01;
 
 /// The scale axis with the largest count that the search meets of those not above `count`; with a
@@ -281,7 +281,7 @@ fn to_count(sat: &PreparedSat, count: usize, diagnostics: &mut Diagnostics) -> R
 
 /// Where the ladder of scales ended.
 enum Ladder {
-    /// Scale 1 has no more spheres than asked.
+    /// Scale 1 has no more spheres than requested.
     First(Arc<Scaled>),
     /// Between two scales.
     Passed { fine: Arc<Scaled>, coarse: Arc<Scaled> },
@@ -321,7 +321,7 @@ fn has_stalled(least: &[usize]) -> bool {
     last >= STEPS_BEFORE_STALL && least[last] as f64 > (1.0 - fall) * least[last - steps] as f64
 }
 
-/// Step 2. Aims a little below the count, since a count above is of no use.
+/// Step 2. Aims a little below the count, since a count above is useless.
 fn between(
     fine: &Scaled,
     mut coarse: Arc<Scaled>,

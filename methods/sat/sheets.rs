@@ -185,7 +185,7 @@ mod tests {
                 faces = mesh.faces.len();
                 removed_in_all += removed;
                 if limit == 90.0 {
-                    // Only what closes up or is a right angle is left.
+                    // Only closed sheets and right angles are left.
                     let open = Incidence::of(&mesh).faces_at().iter().filter(|&&n| n == 1).count();
                     assert_eq!(open, 0);
                 }
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn perturbation_is_as_large_as_said_and_seeded() {
+    fn perturbation_has_its_size_and_is_seeded() {
         let balls: Vec<Sphere> =
             (1..100).map(|k| Sphere::new(Vec3::splat(f64::from(k)), f64::from(k))).collect();
         let SatParams { radius_factor, jitter, .. } = SatParams::default();

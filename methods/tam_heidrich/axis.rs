@@ -211,9 +211,9 @@ pub struct RemainingPoles {
 /// The outer poles that the power crust takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OuterPoles {
-    /// All of the samples: what the paper does for most objects.
+    /// All of the samples: the paper's choice for most objects.
     All,
-    /// Without those of removed features: what it offers for objects with sharp corners.
+    /// Without those of removed features: the paper's option for objects with sharp corners.
     OfRemaining,
 }
 
@@ -314,7 +314,7 @@ pub(super) fn merged(
     let mut complex = CollapseComplex::from_mesh(mesh);
     let mut into: Vec<u32> = (0..mesh.spheres.len() as u32).collect();
     let mut done = 0;
-    // Spheres at which something changed in the pass before: elsewhere the answers are the same.
+    // Spheres at which something changed in the pass before: elsewhere the results are the same.
     let mut changed: Vec<u32> = complex.vertices().collect();
     while !changed.is_empty() {
         let edges = short_edges(&complex, &changed, merge);
@@ -429,7 +429,7 @@ impl DistinctBalls {
             found.volumes.push(volume);
         }
         if found.balls.is_empty() {
-            // Says why.
+            // Returns the reason.
             shape.inner_balls()?;
         }
         Ok(found)
@@ -472,7 +472,7 @@ fn shared_sample(
     let common = a.iter().filter(|s| b.contains(s) && c.contains(s));
     common
         .map(|&s| (positions[s as usize], s))
-        // Three spheres meet in a point and its mirror image, so the side tells which.
+        // Three spheres meet in a point and its mirror image, so the side decides which.
         .filter(|&(position, _)| orient3d(p, q, r, position) != Sign::Negative)
         .map(|(position, s)| (position.distance_squared(vertex), s))
         .min_by(|s, t| s.0.total_cmp(&t.0).then(s.1.cmp(&t.1)))

@@ -11,7 +11,7 @@
 //!    is that of the tetrahedra whose poles lie on it, divided by the volume of the solid. A pole on
 //!    several parts counts for each.
 //! 3. Section 4.1: parts grow over edges of two triangles. Level 1 starts from free edges, each
-//!    further level beside the one before (file `parts.rs`).
+//!    further level next to the one before (file `parts.rs`).
 //! 4. Section 6: rounds by triangle count without any test of topology, at most `t_t_rounds`. *They end
 //!    after the first that removes less than a quarter (`drop`) of what the one before it did*: the
 //!    paper's "dramatic drop", for which it has no number (file `schedule.rs`).
@@ -27,7 +27,7 @@
 //! removed. So results of fewer spheres are always contained in those of more, and a part is the smallest
 //! step. The diagnostics name the count on the other side of the number.
 //!
-//! # What does not reproduce
+//! # Results that do not reproduce
 //! - On an exact axis of a box there are twelve parts of level 1 and one of level 2, as in figure 5, and
 //!   so there are on a box that is sampled on a grid (the built-in one): 161 parts at first, these 13
 //!   after one round by triangle count. On the same box with 3,000 samples of blue noise there are not:
@@ -39,11 +39,11 @@
 //!   loops, on the bear with 35,000 samples of blue noise they leave 18 components. `topology=all` tests
 //!   there too.
 //! - Pruning ends where all that is left is one sheet for each body, or sheets that hold loops, often
-//!   far above the number of spheres asked. The paper says the same of the bunny's feet.
+//!   far above the requested number of spheres. The paper reports the same of the bunny's feet.
 //!
 //! - *The seed.* Moved balls make no loops: the axis of a solid has the same Betti numbers for every seed.
 //!   They do decide which small parts there are, hence which sheets grow together when these go, and which
-//!   single sheet is left in the end. Moved by `1e-4 r`, a twentieth of what they grow, the balls of the
+//!   single sheet is left in the end. Moved by `1e-4 r`, a twentieth of their growth, the balls of the
 //!   screwdriver end at 126 to 4,594 spheres, by the seed (0 to 9); moved by `1e-7 r` at 4,427 to 4,707. So
 //!   this is the default; a tenth of it tears the axis of a sampled frame, whose balls are in special position.
 //!   Other samples of the same surface still end elsewhere: that is the rule of section 4.1.
@@ -78,7 +78,7 @@
 //! - The power crust (section 5) is not made here. The poles for it, inner ones on the remaining parts and
 //!   outer ones with or without those of removed features, come from the extras ([`RemainingPoles`], file
 //!   `axis.rs`); the spheres of the medial mesh are no substitute, since most of them are corners of sheets
-//!   and not poles. Where the medial mesh was given, or `axis=initial` was asked, there are none.
+//!   and not poles. With an external medial mesh or `axis=initial` there are none.
 
 mod axis;
 mod parts;
@@ -113,11 +113,11 @@ pub const PARTS: &str = "parts";
 pub struct PartInfo {
     /// Consecutive from 0, the largest part first.
     pub id: u32,
-    /// 1 at a free edge, 2 beside a part of level 1, and so on; 0 where no free edge can be reached.
+    /// 1 at a free edge, 2 next to a part of level 1, and so on; 0 where no free edge can be reached.
     pub level: u32,
     /// Number of faces.
     pub triangles: usize,
-    /// Volume of the feature that the part stands for, as a fraction of the solid's.
+    /// Volume of the part's feature, as a fraction of the solid's.
     pub volume: f64,
     /// Centroid, in normalised units.
     pub centre: [f64; 3],
@@ -129,7 +129,7 @@ pub struct PartInfo {
 
 /// Pruning by parts as a method.
 ///
-/// Answers all levels. The axis is computed once for all; a level costs a few passes over it.
+/// Supports all levels. The axis is computed once for all; a level costs a few passes over it.
 pub fn method() -> Method<TamHeidrichParams> {
     let info = MethodInfo::new("tam-heidrich", "Tam-Heidrich part pruning")
         .citation(
@@ -172,7 +172,7 @@ impl Simplification for PreparedTamHeidrich {
         pruning.published(&t_v)?;
         if let Level::Spheres(count) = level {
             pruning.go_on(t_v.last().copied().unwrap_or(0.0))?;
-            say_what_was_reached(&mut pruning, count);
+            report_reached(&mut pruning, count);
         }
         let native_level = match level {
             Level::Native(t) => Some(t),
@@ -246,7 +246,7 @@ impl PreparedTamHeidrich {
     }
 }
 
-fn say_what_was_reached(pruning: &mut Pruning<'_>, count: usize) {
+fn report_reached(pruning: &mut Pruning<'_>, count: usize) {
     let reached = pruning.remaining.spheres;
     if reached == count {
         return;

@@ -16,7 +16,7 @@
 //!    zero, collapse `P` from the free edge: every triangle goes, as they are joined, and leaves
 //!    a graph whose relative homology vanishes, a forest each tree of which hangs on `C` in one
 //!    point, which collapses too. If it is not zero, the exact sequence of the whole and what stays
-//!    says that `b1` falls or `b0` grows by that rank in all, and `b2` does not change.
+//!    states that `b1` falls or `b0` grows by that rank in all, and `b2` does not change.
 //! 4. After a removal some simplices of the contact set belong to only one other part: they become its
 //!    own. With counters of parts at each edge and vertex, the test of step 3 is a comparison, and a
 //!    removal is linear in the size of the part.
@@ -87,13 +87,13 @@ impl<'a> Remaining<'a> {
         [b0 as u64, b1, b2]
     }
 
-    /// As a mesh of its own, in the order of the whole.
+    /// As a separate mesh, in the order of the whole.
     pub(super) fn mesh(&self) -> MedialMesh {
         kept_part(&self.axis.mesh, &self.sphere_kept, &self.edge_kept, &self.face_kept)
     }
 }
 
-/// The parts of what remained when it was decomposed, by their smallest triangle.
+/// The parts of the remaining complex when it was decomposed, by their smallest triangle.
 pub(super) struct Parts {
     /// The triangles of part `p` are `faces[start[p]..start[p + 1]]`, ascending.
     start: Vec<usize>,
@@ -102,7 +102,7 @@ pub(super) struct Parts {
     pub(super) volume: Vec<f64>,
     /// Whether it has a free edge: level 1.
     pub(super) free: Vec<bool>,
-    /// `V - E + F` of its own simplices.
+    /// `V - E + F` of its simplices.
     euler: Vec<i64>,
     /// Number of the vertices in its contact set.
     contacts: Vec<u32>,
@@ -132,7 +132,7 @@ impl Shared {
 const NOT_SEEN: u32 = u32::MAX;
 
 impl Parts {
-    /// Decomposes what remains. Nearly linear.
+    /// Decomposes the remaining complex. Nearly linear.
     pub(super) fn of(remaining: &Remaining<'_>) -> Self {
         let axis = remaining.axis;
         let (start, faces) = grown(remaining);
@@ -200,7 +200,7 @@ impl Parts {
         &self.faces[self.start[part]..self.start[part + 1]]
     }
 
-    /// Whether the part touches anything: it is not a component of its own.
+    /// Whether the part touches anything: it is not a separate component.
     pub(super) fn has_contact(&self, part: usize) -> bool {
         self.contacts[part] > 0
     }
@@ -315,7 +315,7 @@ fn grown(remaining: &Remaining<'_>) -> (Vec<usize>, Vec<u32>) {
 // the homotopy type:
 //
 // 1. A triangle of a fin goes with an edge that nothing else has.
-// 2. An edge that lost its last triangle goes with an end that no other edge has. What is left of the
+// 2. An edge that lost its last triangle goes with an end that no other edge has. The remainder of the
 //    sphere there, the volume of its tetrahedra, goes to the other end.
 
 /// The mesh without the triangles that `is_fin` names, as far as they can go; for each sphere of
@@ -530,7 +530,7 @@ fn cycle_rank(pairs: &[u64]) -> (usize, usize) {
     (nodes.len(), loops)
 }
 
-/// For each part its level: 1 at a free edge, one more than that of the lowest part beside it over
+/// For each part its level: 1 at a free edge, one more than that of the lowest part next to it over
 /// an edge; 0 where no part of level 1 can be reached.
 pub(super) fn levels(parts: &Parts, remaining: &Remaining<'_>) -> Vec<u32> {
     let face_edges = remaining.axis.incidence.face_edges();

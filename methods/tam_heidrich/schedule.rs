@@ -24,7 +24,7 @@ pub(super) enum Measure {
 /// Pruning in progress.
 pub(super) struct Pruning<'a> {
     pub(super) remaining: Remaining<'a>,
-    /// The decomposition of what remains.
+    /// The decomposition of the remaining complex.
     pub(super) parts: Parts,
     pub(super) diagnostics: Diagnostics,
     run: &'a RunContext,
@@ -55,13 +55,13 @@ impl<'a> Pruning<'a> {
         pruning
     }
 
-    /// Whether the number of spheres is as near to that asked for as whole parts allow.
+    /// Whether the number of spheres is as near to the requested one as whole parts allow.
     pub(super) fn is_enough(&self) -> bool {
         self.other_side.is_some() || self.remaining.spheres <= self.enough
     }
 
-    /// Removes a part, unless more spheres are nearer to the number that was asked for than are left
-    /// without it. Whether it was removed.
+    /// Removes a part, unless the result would be farther from the requested number of spheres. Returns whether it
+    /// was removed.
     fn remove(&mut self, part: usize) -> bool {
         let before = self.remaining.spheres;
         let after = before - self.parts.own_spheres(part, &self.remaining);
@@ -190,7 +190,7 @@ impl<'a> Pruning<'a> {
         }
     }
 
-    /// Counts of a round, and what it left.
+    /// Counts of a round, and its result.
     fn report(&mut self, name: &str, counts: &[(&str, usize)]) {
         let [b0, b1, b2] = self.remaining.betti().map(|b| b as usize);
         let level_1 = self.parts.free.iter().filter(|&&free| free).count();

@@ -49,7 +49,7 @@ fn homology(all: &Simplices) -> [usize; 3] {
     [vertices.len() - d1, edges.len() - d1 - d2, faces.len() - d2]
 }
 
-/// What is left, read off the flags.
+/// The remaining simplices, read off the flags.
 fn left(remaining: &Remaining<'_>) -> Simplices {
     let whole = &remaining.axis.mesh;
     let vertices = (0..).zip(&remaining.sphere_kept).filter(|v| *v.1).map(|(v, _)| vec![v]);
@@ -216,7 +216,7 @@ fn taking_fins_away_keeps_the_topology() {
         let (mesh, into, left) = without_fins(&whole, &is_fin);
         mesh.check().expect("a valid complex");
         assert_eq!(betti(&mesh), betti(&whole), "{whole:?} {is_fin:?}");
-        // What is no fin stays, and so does what is left of the fins.
+        // Other parts stay, and so does the remainder of the fins.
         let others = is_fin.iter().filter(|fin| !**fin).count();
         assert_eq!(mesh.faces.len(), others + left);
         let numbers: BTreeSet<u32> = into.iter().copied().collect();

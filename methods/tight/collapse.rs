@@ -1,11 +1,11 @@
 //! Passes of collapses of the edges that the samples around them miss least.
 //!
-//! The price of an edge is the change of `sum w e^8` over the samples that the primitives around it
-//! serve, plus what the new primitives protrude, for the best of four places of the merged sphere: both
-//! ends, the midpoint, and the minimiser of the two spheres' squares. Eighth powers, because one sample
-//! that is missed badly decides the maximum, and no later step mends a face across a hole.
+//! The price of an edge is the change of `sum w e^8` over the samples that the primitives around it serve, plus the
+//! protrusion of the new primitives, for the best of four places of the merged sphere: both ends, the midpoint, and
+//! the minimiser of the two spheres' squares. Eighth powers, because one sample that is missed badly decides the
+//! maximum, and no later step repairs a face across a hole.
 //!
-//! Samples see the new star and its rim alone. What another primitive would serve better counts too much,
+//! Samples see the new star and its rim alone. Samples that another primitive would serve better count too much,
 //! never too little.
 
 use std::collections::BTreeSet;
@@ -27,19 +27,19 @@ use crate::Result;
 /// Exponent of the price.
 const POWER: i32 = 8;
 
-/// Weight of a point of a primitive that protrudes. Each stands for several samples.
+/// Weight of a point of a primitive that protrudes. Each represents several samples.
 const PROTRUDING: f64 = 50.0;
 
-/// What one ball protrudes counts from this share on.
+/// The protrusion of one ball counts from this share on.
 const NEGLIGIBLE: f64 = 1e-4;
 
 /// Share of the trace that pulls a minimiser towards the midpoint of its edge.
 const PULL: f64 = 1e-3;
 
-/// Every so many samples are looked at first.
+/// One of this number of samples is looked at first.
 const ROUGH: usize = 8;
 
-/// Edges that are priced before the limit is set anew, at least.
+/// Edges that are priced before the limit is updated, at least.
 const BLOCK: usize = 64;
 
 /// Distance between points of a new star at which it is tested for protruding.
@@ -80,7 +80,7 @@ pub(super) struct Passed {
 /// collapse is possible.
 ///
 /// A `careful` pass looks at little more than the edges that it needs, and leaves the rest to the next one,
-/// which prices them anew.
+/// which prices them again.
 pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Option<Passed> {
     let mesh = &descent.mesh;
     let mut complex = CollapseComplex::from_mesh(mesh);
@@ -197,7 +197,7 @@ impl<'a> Stars<'a> {
 
     /// At least the `wanted` cheapest edges that can be collapsed, cheapest first.
     ///
-    /// Edges that look cheap by a few samples come first: what they cost is the limit for the others, most of
+    /// Edges that look cheap by a few samples come first: their cost is the limit for the others, most of
     /// which exceed it soon.
     fn cheapest(
         &self,
@@ -347,7 +347,7 @@ impl<'a> Stars<'a> {
     }
 }
 
-/// What surrounds an edge once it is collapsed.
+/// The surroundings of an edge once it is collapsed.
 struct Ring {
     neighbours: Vec<Sphere>,
     sides: Vec<[Sphere; 2]>,
@@ -399,7 +399,7 @@ impl Ring {
         energy
     }
 
-    /// What protrudes of the merged sphere, its edges and faces, at a few points of each; given up beyond
+    /// Protrusion of the merged sphere, its edges and faces, at a few points of each; given up beyond
     /// `limit`. Balls that add less than the share [`NEGLIGIBLE`] of `scale` are not looked for: eighth powers make
     /// these most.
     fn protrusion(&self, sphere: Sphere, goal: &Goal, scale: f64, limit: f64) -> f64 {
@@ -444,7 +444,7 @@ impl Ring {
 /// Times that the step of a sphere is halved before it is taken back altogether.
 const HALVINGS: usize = 4;
 
-/// Faces that stay where they are, beside a mesh that moves. Vertices that are not of the mesh have larger
+/// Faces that stay where they are, next to a mesh that moves. Vertices that are not of the mesh have larger
 /// numbers than those that are.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Still {
@@ -452,7 +452,7 @@ pub(super) struct Still {
     pub corners: Vec<[Vec3; 3]>,
 }
 
-/// What a mesh must not come to do while its spheres move.
+/// Violations that a mesh must avoid while its spheres move.
 pub(super) struct Guard {
     still: Crossings,
     /// Pairs that cross already.
@@ -479,9 +479,9 @@ impl Guard {
     /// over, or come to cross another one, go half the way, a quarter, or stay where they were.
     pub fn hold(&self, before: &MedialMesh, after: &mut MedialMesh, goal: &Goal) {
         clamp(after, goal);
-        // Taking one vertex back can fold another face of it. This ends: what is all taken back is as before.
+        // Taking one vertex back can fold another face of it. This ends: with all taken back the mesh is as before.
         let mut halvings = vec![0; before.spheres.len()];
-        // The faces that are looked at: all, and then those of what was taken back.
+        // The faces that are looked at: all, and then those of vertices taken back.
         let mut changed = vec![true; before.spheres.len()];
         loop {
             let mut back = before.faces.clone();
@@ -516,18 +516,18 @@ impl Guard {
         }
     }
 
-    /// The pairs with a face of the mesh for which `is_asked`.
+    /// The pairs with a face of the mesh for which `is_chosen`.
     fn crossing(
         &self,
         mesh: &MedialMesh,
-        is_asked: impl Fn(&[u32; 3]) -> bool + Sync,
+        is_chosen: impl Fn(&[u32; 3]) -> bool + Sync,
     ) -> Vec<Pair> {
         let moving =
             Crossings::new(mesh.faces.clone(), |face| corners(mesh, mesh.faces[face as usize]));
-        let moving = moving.pairs_with(|face| is_asked(&mesh.faces[face as usize]));
+        let moving = moving.pairs_with(|face| is_chosen(&mesh.faces[face as usize]));
         let moving = moving.into_iter().map(Pair::Moving);
-        let asked = (0..mesh.faces.len() as u32).filter(|&f| is_asked(&mesh.faces[f as usize]));
-        let still = asked.flat_map(|face| {
+        let chosen = (0..mesh.faces.len() as u32).filter(|&f| is_chosen(&mesh.faces[f as usize]));
+        let still = chosen.flat_map(|face| {
             let own = mesh.faces[face as usize];
             let others = self.still.of(own, corners(mesh, own));
             others.into_iter().map(move |other| Pair::Still([face, other]))
@@ -564,7 +564,7 @@ pub(super) struct Patch<'a> {
 }
 
 impl Patch<'_> {
-    /// Moves the spheres around `places`, at one power after the other, with so many steps each.
+    /// Moves the spheres around `places`, at one power after the other, with `steps` steps each.
     ///
     /// # Errors
     /// When the run is cancelled.

@@ -1,4 +1,4 @@
-//! What the union of the primitives is to match: samples of the surface, points inside the solid, and
+//! The target of the union of the primitives: samples of the surface, points inside the solid, and
 //! depths of any point.
 
 use std::sync::Arc;
@@ -77,7 +77,7 @@ pub(super) struct Depth {
     pub gradient: Vec3,
 }
 
-/// What is known of the depth of a point: the depth and the closest face, or that it is at least so deep, and
+/// The known depth of a point: the depth and the closest face, or a lower bound of the depth and
 /// a face near to it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Known {
@@ -109,7 +109,7 @@ impl Goal {
         Ok(goal)
     }
 
-    /// The points that residuals are made for, when so many spheres are left.
+    /// The points that residuals are made for, when `spheres` are left.
     pub fn points(&self, spheres: usize) -> Points {
         let Self { surface, pool, seed, .. } = self;
         let count = if spheres < 500 { SAMPLES } else { 2 * SAMPLES };
@@ -125,7 +125,7 @@ impl Goal {
         let samples = spread.into_iter().map(|point| Sample { point, weight: 1.0 });
         let stride = (pool.len() / INTERIOR).max(1);
         let interior = pool.iter().step_by(stride).copied().collect();
-        // Along a curve: what serves a sample mostly serves the next one.
+        // Along a curve: the primitive of a sample mostly serves the next one.
         let samples: Vec<Sample> = samples.chain(vertices).collect();
         let places: Vec<Vec3> = samples.iter().map(|sample| sample.point).collect();
         let samples = morton_order(&places).into_iter().map(|(_, i)| samples[i as usize]).collect();
@@ -169,10 +169,10 @@ impl Goal {
         Depth { value: inward * closest.distance, gradient }
     }
 
-    /// The depth of a place that moved: `known` holds what was found where it was before.
+    /// The depth of a place that moved: `known` holds the result at its earlier place.
     ///
     /// Depths are 1-Lipschitz, so a place that moved less than its depth is on the same side, and one
-    /// that is deeper than `enough` all the same needs no query: `None`.
+    /// that is still deeper than `enough` needs no query: `None`.
     /// Where a query is needed it looks farther than `enough` by `margin` times the way, to spare the next one.
     pub fn depth_of_moved(
         &self,
@@ -248,7 +248,7 @@ impl Goal {
         (b - a).cross(c - a).normalize_or_zero()
     }
 
-    /// At most so many points inside: as many random ones in each cell of a grid that reaches the solid.
+    /// At most `count` points inside: as many random ones in each cell of a grid that reaches the solid.
     fn points_inside(&self, count: usize) -> Vec<Interior> {
         let (lo, hi) = self.surface.bounding_box().unwrap_or_default();
         let extent = hi - lo;
@@ -350,7 +350,7 @@ pub(super) struct Held {
     pub known: Option<Known>,
 }
 
-/// All residuals of a medial mesh that are not zero, and what each sample is served by.
+/// All residuals of a medial mesh that are not zero, and the primitive that serves each sample.
 pub(super) struct Residuals {
     pub rows: Vec<Row>,
     /// For each sample of the surface, then each interior point.
@@ -393,8 +393,8 @@ fn interpolated(mesh: &MedialMesh, held: &Held) -> Sphere {
     Sphere::new(centre, radius)
 }
 
-/// About so many points of the medial mesh, but all spheres: the rest spread evenly over edges and faces, so
-/// that not each small one has a point.
+/// About `count` points of the medial mesh, but all spheres: the rest spread evenly over edges and faces, so that not
+/// each small one has a point.
 fn spread_over(mesh: &MedialMesh, count: usize) -> Vec<Held> {
     let lengths = mesh.edges.iter().map(|edge| {
         let [a, b] = edge.map(|v| mesh.spheres[v as usize].centre);
@@ -449,7 +449,7 @@ pub(super) fn places(mesh: &MedialMesh, share: f64) -> Vec<Held> {
 }
 
 /// The residuals of a medial mesh. Another one that stays is at the distance `limits` from each sample, or
-/// there is none. `near` is what served each sample when the spheres were a little elsewhere, if that is
+/// there is none. `near` is the primitive of each sample when the spheres were a little elsewhere, if that is
 /// known. Balls that protrude by no more than `tolerance` are left out.
 ///
 /// # Errors
@@ -467,7 +467,7 @@ pub(super) fn residuals(
     let surface = points.samples.iter().map(|sample| sample.point);
     let places: Vec<Vec3> = surface.chain(points.interior.iter().map(|x| x.point)).collect();
     let count = points.samples.len();
-    // What holds an interior point deeply enough holds it: no deeper primitive is looked for.
+    // A primitive that holds an interior point deeply enough is accepted: no deeper one is searched.
     let nearest = union.deepest_batch_near(&places, near, |i| {
         i.checked_sub(count).map(|i| held_from(points.interior[i].depth))
     });

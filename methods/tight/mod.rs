@@ -19,7 +19,7 @@
 //!    where it hurts least. Only the spheres around them move then (`Patch`).
 //! 6. *Rounds* (`rounds.rs`): steps of 3 at powers up to 32, between which the largest errors, found by
 //!    local ascent on both sides, join the samples; then swaps as in 5, and rounds again. The state
-//!    with the least measured error is the answer.
+//!    with the least measured error is the result.
 //!
 //! # Notation
 //!
@@ -27,23 +27,23 @@
 //! least signed distance to a primitive, negative inside. Lengths are fractions of the bounding-box
 //! diagonal.
 //!
-//! # What is held and what not
+//! # Invariants and their limits
 //!
 //! - A collapse and an insertion keep the homotopy type of the medial mesh, so its Betti numbers are those
 //!   of the start. Those of the union are not looked at.
 //! - The error is measured at samples and by ascent from them; it is not certified. `lambda` weighs the
 //!   mean against the maximum.
-//! - No collapse, insertion or step makes two faces cross that did not (`Sheets`, `Guard`); those that cross at
-//!   the start may go on.
+//! - No collapse, insertion or step makes two faces cross that did not (`Sheets`, `Guard`). Faces that cross at
+//!   the start may stay crossed.
 //! - The result depends on the samples, hence on the seed and on the orientation of the input; docs/tight.md
-//!   says how much.
+//!   has figures.
 //! - The native level `error` is a bound of the two-sided error, a fraction of the diagonal, held by a
 //!   certificate. It takes several times as long as a number of spheres.
 //!
 //! # Starting from a given mesh
 //!
-//! If the shape has an initial medial mesh of its own, that is the start. With no more spheres than are
-//! asked for, its connectivity stays as it is and its spheres are moved (step 6 without swaps).
+//! If the shape has an external initial medial mesh, that is the start. If it has no more spheres than requested, its
+//! connectivity stays as it is and its spheres are moved (step 6 without swaps).
 
 mod collapse;
 mod goal;
@@ -96,9 +96,9 @@ pub struct Tight {
     starter: Arc<dyn MedialSimplifier>,
 }
 
-/// The `tight` simplifier, starting from what `starter` leaves.
+/// The `tight` simplifier, starting from the result of `starter`.
 ///
-/// Answers [`Level::Spheres`] up to a few thousand, at the cost of some hundred evaluations of all samples, and
+/// Supports [`Level::Spheres`] up to a few thousand, at the cost of some hundred evaluations of all samples, and
 /// [`Level::Native`], a bound of the two-sided error, at several times that.
 pub fn method(starter: impl MedialSimplifier + 'static) -> Tight {
     let info = MethodInfo::new("tight", "Tight")
@@ -200,7 +200,7 @@ fn bounded(spheres: usize) -> Result<()> {
         return Ok(());
     }
     Err(SimplifyError::unsupported(format!(
-        "{spheres} spheres to begin with; `tight` places at most {MOST} together: ask for fewer, or \
+        "{spheres} spheres to begin with; `tight` places at most {MOST} together; request fewer, or \
          simplify them by another method first"
     )))
 }
@@ -273,7 +273,7 @@ impl TightParams {
 // ----------------------------------------------------------------------------
 // The level by error: few spheres whose two-sided error a certificate holds within a bound.
 //
-// From a state within the bound the collapse goes on, to seven tenths of the spheres at first and to ever
+// From a state within the bound the collapse continues, to seven tenths of the spheres at first and to ever
 // larger shares after each failure. A state counts if its certified error is within the bound; one that
 // misses it by little is tried again with swaps.
 

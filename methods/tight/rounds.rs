@@ -2,14 +2,14 @@
 //!
 //! 1. Steps at the powers 4 and 8.
 //! 2. Rounds: the places of the largest errors join the samples as witnesses, then steps at the power 16
-//!    or 32 beside `lambda` times the squares. Witnesses are found by local ascent on both sides, and
+//!    or 32 plus `lambda` times the squares. Witnesses are found by local ascent on both sides, and
 //!    among the points inside.
 //! 3. Swaps of a few spheres, and later of one, from the best state so far. Only the spheres around them move at
 //!    first; where that lowers the sum of the powers all spheres take a few steps, and the error is
 //!    measured again.
 //! 4. Rounds as in 2, with the witnesses that were found meanwhile.
 //!
-//! What is returned is the state of the least measured error.
+//! The result is the state of the least measured error.
 
 use std::collections::{BTreeSet, HashSet};
 
@@ -59,7 +59,7 @@ const PATIENCE: usize = 2;
 const SWAPS: usize = 60;
 const FAILURES: usize = 8;
 
-/// One sphere of so many is swapped at first, later fewer, and then one at a time.
+/// One of this number of spheres is swapped at first, later fewer, and then one at a time.
 const SPHERES: usize = 25;
 
 /// A swap that raises the objective more than this many times is given up before all spheres take steps.
@@ -190,7 +190,7 @@ impl Polish<'_> {
         Ok(helped)
     }
 
-    /// A little below the error counts as one, so that what exceeds it weighs heavily.
+    /// A little below the error counts as one, so that larger ones weigh heavily.
     fn objective(&self, power: f64, error: f64) -> Objective {
         Objective { power, mean: self.params.lambda, scale: 0.9 * error }
     }
@@ -271,7 +271,7 @@ pub(super) const LEAST_RADIUS: f64 = 1e-5;
 /// Damping before the first step, a share of the diagonal.
 const FIRST_DAMPING: f64 = 1e-2;
 
-/// What holds a fixed sphere, times the mean of the diagonal.
+/// Stiffness of a fixed sphere, times the mean of the diagonal.
 const STIFF: f64 = 1e12;
 
 /// Steps that are refused one after the other before the descent ends.
@@ -284,12 +284,12 @@ const SMALL: f64 = 1e-3;
 const HIGH: f64 = 4.0;
 const TOLERATED: f64 = 0.1;
 
-/// What is minimised.
+/// The objective.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Objective {
     /// Exponent, at least 2.
     pub power: f64,
-    /// Weight of the squares beside it.
+    /// Weight of the squares.
     pub mean: f64,
     /// Error that counts as 1.
     pub scale: f64,
@@ -310,7 +310,7 @@ impl Objective {
         counted.sum()
     }
 
-    /// How far a ball may protrude: what hardly counts at a high power need not be looked for.
+    /// How far a ball may protrude: protrusions without weight at a high power are not searched.
     fn tolerance(&self) -> f64 {
         if self.power >= HIGH { TOLERATED * self.scale } else { 0.0 }
     }
@@ -329,12 +329,12 @@ impl Objective {
     }
 }
 
-/// What is around a part of a mesh; empty if there is nothing else.
+/// The surroundings of a part of a mesh; may be empty.
 #[derive(Default)]
 pub(super) struct Rest {
     /// Spheres of the part that do not move.
     pub fixed: Vec<bool>,
-    /// For each sample the distance of what is not in the part.
+    /// For each sample the distance of everything outside the part.
     pub limits: Vec<f64>,
     /// Faces that are not in the part.
     pub still: Still,
@@ -349,7 +349,7 @@ pub(super) struct Descent<'a> {
     held: Vec<Held>,
     /// Spheres that do not move; empty if all do.
     fixed: Vec<bool>,
-    /// For each sample the distance of what is not in the mesh; empty if there is nothing else.
+    /// For each sample the distance of everything outside the mesh; may be empty.
     limits: Vec<f64>,
     guard: Guard,
     pattern: Pattern,
@@ -395,7 +395,7 @@ impl<'a> Descent<'a> {
         objective.value(&self.residuals.rows)
     }
 
-    /// Takes at most so many steps, each of which lessens the objective.
+    /// Takes at most `steps` steps, each of which lessens the objective.
     ///
     /// # Errors
     /// When the run is cancelled.
@@ -419,9 +419,9 @@ impl<'a> Descent<'a> {
             // A value that is not a number is not lower, so such a step is refused.
             if lower < value {
                 let is_small = value - lower < SMALL * value;
-                // Nielsen 1999: the better the model foretold it, the longer the next step.
-                let told = ((value - lower) / expected).clamp(0.0, 1.0);
-                self.damping *= (1.0 - (2.0 * told - 1.0).powi(3)).max(0.2);
+                // Nielsen 1999: the better the model predicted it, the longer the next step.
+                let gain = ((value - lower) / expected).clamp(0.0, 1.0);
+                self.damping *= (1.0 - (2.0 * gain - 1.0).powi(3)).max(0.2);
                 growth = 2.0;
                 (self.mesh, self.residuals, value) = (trial, found, lower);
                 self.damping = self.damping.max(1e-9);
@@ -549,7 +549,7 @@ impl Pattern {
         let mut fill = Vec::with_capacity(vertices);
         while let Some((_, v)) = queue.pop_first() {
             let link = std::mem::take(&mut around[v as usize]);
-            // What was adjacent to an eliminated vertex becomes adjacent to each other.
+            // Neighbours of an eliminated vertex become adjacent to each other.
             for &w in &link {
                 let set = &mut around[w as usize];
                 queue.remove(&(set.len(), w));

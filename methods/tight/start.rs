@@ -94,14 +94,14 @@ impl Start {
         Ok(start)
     }
 
-    /// What is to be said of it.
+    /// Adds its warnings and counts.
     pub fn describe(&self, diagnostics: &mut Diagnostics) {
         diagnostics.count("samples_of_the_start", self.samples);
         if self.joined > 0 {
             diagnostics.count("components_joined", self.joined);
         }
         if let Some(warning) = topology_warning(self.betti, self.shape.expected_betti()) {
-            diagnostics.warn(format!("the start is wrong, and the result with it: {warning}"));
+            diagnostics.warn(format!("the start is wrong, and so is the result: {warning}"));
         }
     }
 
@@ -136,7 +136,7 @@ impl Start {
     }
 }
 
-/// Joins components by edges inside the solid until `parts` are left, the smallest one to what is closest to it.
+/// Joins components by edges inside the solid until `parts` are left, the smallest one to the part closest to it.
 /// Where the solid is thinner than the samples are apart, its medial mesh can fall into pieces. Returns how many
 /// edges were added.
 pub(super) fn joined(mesh: &mut MedialMesh, shape: &Shape, parts: u64) -> usize {
@@ -193,7 +193,7 @@ fn bridge(mesh: &MedialMesh, shape: &Shape, own: &[u32]) -> Option<[u32; 2]> {
 // ----------------------------------------------------------------------------
 // Which faces of a medial mesh cross, and which a collapse would make cross.
 //
-// A pair that crosses already may go on doing so: its image under the collapse is known. Any other pair is a
+// A pair that crosses already may stay crossed: its image under the collapse is known. Any other pair is a
 // reason against the collapse.
 
 type Face = [u32; 3];
@@ -310,7 +310,7 @@ const AT_END: f64 = 0.95;
 /// A foot with a smaller weight at one sphere does not use it.
 const UNUSED: f64 = 0.05;
 
-/// Powers and steps around what was inserted, and around what was collapsed.
+/// Powers and steps around insertions, and around collapses.
 const INSERTED: [(f64, usize); 1] = [(8.0, 6)];
 const COLLAPSED: [(f64, usize); 2] = [(8.0, 5), (16.0, 5)];
 

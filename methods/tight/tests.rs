@@ -26,7 +26,7 @@ fn quick() -> Params {
     params
 }
 
-/// A medial mesh of a shape with so many spheres.
+/// A medial mesh of a shape with `count` spheres.
 fn start(shape: &Shape, count: usize) -> MedialMesh {
     let qmat = crate::find("qmat").unwrap();
     let mut levels = qmat.prepare(shape, &Params::none(), &RunContext::default()).unwrap();
@@ -35,7 +35,7 @@ fn start(shape: &Shape, count: usize) -> MedialMesh {
 }
 
 #[test]
-fn the_factorisation_solves_what_it_is_given() {
+fn the_factorisation_solves_its_system() {
     let mut rng = Pcg64::seed_from_u64(7);
     let edges: Vec<[u32; 2]> = vec![[0, 1], [1, 2], [2, 3], [0, 3], [3, 4], [1, 5], [4, 5], [0, 6]];
     let pattern = Pattern::new(8, &edges);
@@ -74,7 +74,7 @@ fn the_factorisation_solves_what_it_is_given() {
 }
 
 #[test]
-fn residuals_have_the_derivatives_that_differences_tell() {
+fn residuals_have_the_derivatives_of_finite_differences() {
     let shape = shape("bracket", 6);
     let goal = Goal::new(&shape, 0).unwrap();
     let mesh = start(&shape, 30);
@@ -287,16 +287,16 @@ fn a_step_that_makes_faces_cross_is_shortened_and_others_are_not() {
     let wanted = after.clone();
     Guard::new(&before, Still::default()).hold(&before, &mut after, &goal);
     assert!(crossing_faces(&after).is_empty());
-    assert_eq!(after.spheres[0], wanted.spheres[0], "what has no part in it moves as it wanted");
+    assert_eq!(after.spheres[0], wanted.spheres[0], "other spheres move freely");
     let [from, to] = [&before, &after].map(|mesh| mesh.spheres[3].centre.z);
     assert!(to < from, "shortened, not refused: {from} to {to}");
 
-    // What crosses already may go on.
+    // Faces that cross already may stay crossed.
     let mut further = wanted.clone();
     further.spheres[4].centre.z -= 0.01;
-    let asked = further.clone();
+    let requested = further.clone();
     Guard::new(&wanted, Still::default()).hold(&wanted, &mut further, &goal);
-    assert_eq!(further.spheres, asked.spheres);
+    assert_eq!(further.spheres, requested.spheres);
 
     // The same where the other face is one that stays.
     let part = before.induced(&[false, false, false, true, true, true]);

@@ -4,7 +4,7 @@
 //! Sampling*, SIGGRAPH Asia 2024 Conference Papers, <https://huang46u.github.io/VMAS/>. The paper itself
 //! was not available to us: all formulas are those of two programs of its first author, the published
 //! code (huang46u/VMAS-code) and the CGAL package `Variational_medial_axis`, read for facts. Steps and
-//! equations have no numbers here for that reason, and what only the paper says is missing.
+//! equations have no numbers here for that reason, and details of the paper alone are missing.
 //!
 //! 0. *Points* (`points.rs`): area-uniform samples, 100 for each sphere and at least 20,000, adjacent to their
 //!    10 nearest ones; or the vertices of the mesh. One sphere to begin with.
@@ -64,16 +64,16 @@
 //! - The search for the least error leaves out spheres that cannot have it; the result is that of looking
 //!   at all.
 //! - The rounds end when 20 rounds with splits have passed without more spheres than ever before:
-//!   dropped clusters can keep the target out of reach for ever. A warning says so.
+//!   dropped clusters can keep the target out of reach for ever, which a warning reports.
 //! - The last cluster is never dropped, so that the result is never empty.
 //! - Points without area are left out.
 //!
-//! # What is not promised
+//! # Not guaranteed
 //!
 //! Nothing holds the topology: four clusters that are adjacent in pairs give a hollow tetrahedron, and a ring
 //! of three a false triangle. `connect=faces` keeps only the triangles in which three clusters meet.
-//! Betti numbers that differ from the solid's are for the judge to tell, and not mended. CGAL's manual does not
-//! recommend more than 300 spheres, nor CAD models.
+//! Betti numbers may differ from the solid's: the evaluation reports them, and nothing repairs them. CGAL's manual
+//! does not recommend more than 300 spheres, nor CAD models.
 
 mod points;
 mod refit;
@@ -104,12 +104,12 @@ const SAMPLES_PER_SPHERE: usize = 100;
 /// With `points=auto`, fewer vertices for each sphere than this call for samples.
 const VERTICES_PER_SPHERE: usize = 25;
 
-/// Most samples that a number of spheres asks for by itself: memory and time stay bounded.
+/// Most samples that a number of spheres requests by default: memory and time stay bounded.
 const MOST_DEFAULT_SAMPLES: usize = 100_000;
 
 /// Variational medial axis sampling as a method.
 ///
-/// Answers [`Level::Spheres`] and [`Level::Published`], each from one sphere on: `O(P)` for each of some
+/// Supports [`Level::Spheres`] and [`Level::Published`], each from one sphere on: `O(P)` for each of some
 /// hundred rounds, with `P` the number of surface points.
 pub fn method() -> Method<VmasParams> {
     let info = MethodInfo::new("vmas", "Variational medial axis sampling")
@@ -149,18 +149,18 @@ struct PreparedVmas<'s> {
 
 impl Simplification for PreparedVmas<'_> {
     fn at(&mut self, level: Level) -> Result<Simplified> {
-        let asked = match some_spheres(level)? {
+        let requested = match some_spheres(level)? {
             Level::Spheres(count) => count,
             Level::Published => PUBLISHED,
             Level::Native(_) => {
-                let why = "its own level is the number of spheres: ask for that";
+                let why = "its native level is the number of spheres; request that number";
                 return Err(SimplifyError::unsupported(why));
             }
         };
-        let params = self.params.resolved(asked, self.shape.mesh().vertices.len());
-        let points = self.points(asked, params)?;
-        // Each sphere needs points of its own.
-        let target = asked.min(match params.points {
+        let params = self.params.resolved(requested, self.shape.mesh().vertices.len());
+        let points = self.points(requested, params)?;
+        // Each sphere needs separate points.
+        let target = requested.min(match params.points {
             Points::Samples => (points.len() / SAMPLES_PER_SPHERE).max(1),
             _ => points.len(),
         });
@@ -169,7 +169,7 @@ impl Simplification for PreparedVmas<'_> {
         let mesh = sampling.mesh(self.params.connect)?;
         let mut diagnostics = Diagnostics::default();
         sampling.tally.describe(points.len(), &mut diagnostics);
-        explain(asked, target, mesh.spheres.len(), ended, &mut diagnostics);
+        explain(requested, target, mesh.spheres.len(), ended, &mut diagnostics);
         Ok(Simplified { diagnostics, ..Simplified::new(mesh, level) })
     }
 }
@@ -193,27 +193,27 @@ impl PreparedVmas<'_> {
     }
 }
 
-/// Why there are fewer spheres than asked, or the error is not at rest.
+/// Why there are fewer spheres than requested, or the error is not at rest.
 fn explain(
-    asked: usize,
+    requested: usize,
     target: usize,
     reached: usize,
     ended: Ended,
     diagnostics: &mut Diagnostics,
 ) {
-    let instead = format!("{reached} spheres instead of {asked}");
+    let instead = format!("{reached} spheres instead of {requested}");
     if reached < target {
         let why = match ended {
-            Ended::IterationLimit => "the rounds at most were made (iterations)",
+            Ended::IterationLimit => "the limit of rounds was reached (iterations)",
             _ => "clusters of too few points are dropped as fast as spheres are split",
         };
         diagnostics.warn(format!("{instead}: {why}"));
-    } else if target < asked {
+    } else if target < requested {
         diagnostics.warn(format!(
             "{instead}: more than {target} need more surface points than there are (samples)"
         ));
     } else if ended == Ended::IterationLimit {
-        diagnostics.warn("the rounds at most were made, and the error is not at rest");
+        diagnostics.warn("the limit of rounds was reached, and the error is not at rest");
     }
 }
 
@@ -249,7 +249,7 @@ medial::parameters! {
         /// Weight of the Euclidean part of the energy, above 0 and at most 1; with a small one,
         /// spheres reach into features.
         lambda: f64 = 0.2, "pure number";
-        /// The refit minimises what both published programs do (lambda squared, plane distances summed
+        /// The refit minimises the objective of both published programs (lambda squared, plane distances summed
         /// before they are squared), or the energy as written.
         refit: Refit = Refit::Published, "published or energy";
         /// A shrinking ball touches surface points, or the mesh: exact, but slower.
@@ -262,7 +262,7 @@ medial::parameters! {
     }
 }
 
-/// What the surface is to the method.
+/// The representation of the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Points {
@@ -274,7 +274,7 @@ pub enum Points {
     Vertices,
 }
 
-/// What the refit minimises.
+/// The objective of the refit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Refit {
@@ -284,7 +284,7 @@ pub enum Refit {
     Published,
 }
 
-/// What a shrinking ball may touch.
+/// The points that a shrinking ball may touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Contact {
@@ -308,7 +308,7 @@ pub enum Connect {
 const MOST_SAMPLES: usize = 1_000_000;
 
 impl VmasParams {
-    /// With the kind of points for a number of spheres on a mesh of so many vertices.
+    /// With the kind of points for a number of spheres on a mesh of `vertices` vertices.
     fn resolved(self, spheres: usize, vertices: usize) -> Self {
         let points = match self.points {
             Points::Auto if vertices < VERTICES_PER_SPHERE.saturating_mul(spheres) => {

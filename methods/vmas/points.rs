@@ -52,7 +52,7 @@ pub(super) struct SurfacePoints {
 /// Where three points are mutually adjacent.
 #[derive(Clone, Debug)]
 pub(super) enum Locality {
-    /// Each point is adjacent to so many nearest ones, itself among them, listed one point after another.
+    /// Each point is adjacent to its `count` nearest ones, itself among them, listed one point after another.
     Nearest { count: usize, ids: Vec<u32> },
     /// The faces of the mesh.
     Faces(Vec<[u32; 3]>),
@@ -91,7 +91,7 @@ impl SurfacePoints {
         Self::of_oriented(&oriented.collect::<Vec<_>>(), neighbours)
     }
 
-    /// Points with one tangent plane each, adjacent to so many nearest ones, themselves among them.
+    /// Points with one tangent plane each, adjacent to `neighbours` nearest ones, themselves among them.
     pub fn of_oriented(oriented: &[Oriented], neighbours: usize) -> Self {
         let unplaced = oriented.iter().enumerate().map(|(place, point)| {
             let &Oriented { position, normal, area } = point;
@@ -297,7 +297,7 @@ impl PointGroups {
         bounds.fold((f64::INFINITY, 0), |a, b| if b.0 < a.0 { b } else { a }).1
     }
 
-    /// Looks at the points of a group. One of those beyond the last is looked at in vain.
+    /// Looks at the points of a group. At most one beyond the last is looked at.
     fn scan(&self, group: usize, at: &[f64x4; 3], best: &mut (f64, u32)) {
         let Some(points) = self.points.get(group * LANES..(group + 1) * LANES) else { return };
         let (mut least, mut who) = (f64x4::splat(f64::INFINITY), f64x4::splat(0.0));
@@ -338,7 +338,7 @@ fn lower_bounds([x, y, z, radius]: &[f64x4; 4], at: &[f64x4; 3]) -> f64x4 {
 // ----------------------------------------------------------------------------
 // The nearest samples of each sample.
 
-/// Samples in the first disc that is searched, as a multiple of those wanted: seldom is it too small.
+/// Samples in the first disc that is searched, as a multiple of those wanted: rarely too few.
 const AMPLE: f64 = 1.8;
 
 /// The `count` nearest points of each point, itself among them, by distance and then id; listed one point

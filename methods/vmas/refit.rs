@@ -2,7 +2,7 @@
 //!
 //! A residual `rho(c, r)` of weight `w` has the Jacobian `-(n, k)`: `n_f` and 1 for the distance to a
 //! plane, `(v - c) / |v - c|` and 1 for the distance to the sphere. The first kind is linear: its sum of
-//! squares is one quadric in `s` for the whole cluster, made once. The second is summed anew in each step,
+//! squares is one quadric in `s` for the whole cluster, made once. The second is summed again in each step,
 //! four points at a time.
 
 use medial::Vec3;
@@ -228,13 +228,13 @@ impl System {
 }
 
 // ----------------------------------------------------------------------------
-// What the refit minimises: the energy, or what the published programs minimise in its place.
+// The objective of the refit: the energy, or the objective of the published programs.
 
 /// The residuals of all points.
 pub(super) enum Residuals {
     /// The energy as written.
     Energy(Energy),
-    /// What both programs minimise: for each point one residual, a weighted sum of distances to planes, and
+    /// The objective of both programs: for each point one residual, a weighted sum of distances to planes, and
     /// the Euclidean one with the square of `lambda`.
     Published { sums: Vec<PlaneSum>, energy: Energy },
 }

@@ -19,7 +19,7 @@ use crate::Result;
 /// A round whose total error changes by less than this is at rest; a fraction of the squared longest side.
 const AT_REST: f64 = 1e-5;
 
-/// Spheres are split every so many rounds, at rest or not.
+/// Spheres are split each time after this number of rounds, at rest or not.
 const SPLIT_EVERY: usize = 10;
 
 /// A refit ends with a step shorter than this, a fraction of the longest side.
@@ -42,7 +42,7 @@ pub(super) struct VariationalSampling<'a> {
     pub tally: Tally,
 }
 
-/// What happened on the way.
+/// Counts of events in the iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Tally {
     pub iterations: usize,
@@ -196,10 +196,10 @@ fn largest_ball(points: &SurfacePoints, solid: &Solid<'_>) -> Option<Ball> {
 // ----------------------------------------------------------------------------
 // Step 1: every surface point goes to the sphere with the least error.
 //
-// The search is exhaustive by definition. Most spheres are left out all the same, because
+// The search is exhaustive by definition. Most spheres are still left out, because
 // `e_v(s) >= lambda d^2` where the point is `d` outside the sphere, and `e_v(s) >= (1 + lambda) d^2` where it is
 // `d` inside: there every plane distance `n . (v - c)` is at most `|v - c| < r`. The error of any one
-// sphere bounds the least error, and the sphere of the round before is seldom a bad one.
+// sphere bounds the least error, and the sphere of the round before is rarely a bad one.
 
 /// The label of a point without a sphere.
 pub(super) const NONE: u32 = u32::MAX;
@@ -215,7 +215,7 @@ pub(super) struct Clusters {
 }
 
 /// Gives every point the label of the sphere with the least error, the smallest of equal ones. Labels from
-/// before are where the search starts; the answer does not depend on them.
+/// before are where the search starts; the result does not depend on them.
 pub(super) fn assign(
     points: &SurfacePoints,
     energy: Energy,
@@ -292,7 +292,7 @@ impl Clusters {
 }
 
 /// Drops the spheres with fewer than `least` points, whose points stay without a label in this round; the
-/// largest cluster stays whatever its size. Returns the clusters that are left.
+/// largest cluster stays at any size. Returns the clusters that are left.
 pub(super) fn drop_small(spheres: &mut Vec<Sphere>, labels: &mut [u32], least: usize) -> Clusters {
     let clusters = Clusters::of_labels(labels, spheres.len());
     // Backwards, so that of equal clusters the first counts as the largest.
@@ -352,7 +352,7 @@ pub(super) fn misfits(
     found.collect()
 }
 
-/// The spheres to split, those with the largest errors first: at most so many as are missing, and none of
+/// The spheres to split, those with the largest errors first: at most the missing number, and none of
 /// which a neighbour is split. `edges` are pairs of adjacent spheres.
 pub(super) fn to_split(misfits: &[Misfit], edges: &[[u32; 2]], missing: usize) -> Vec<u32> {
     let spheres = misfits.len();

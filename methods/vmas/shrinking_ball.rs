@@ -28,7 +28,7 @@ const SEPARATION: f64 = 20.0;
 /// A contact is in front of the surface if the cosine of its angle to the normal is at most this.
 const IN_FRONT: f64 = 1e-12;
 
-/// What a ball may touch.
+/// The points that a ball may touch.
 #[derive(Clone, Copy)]
 pub(super) enum Touched<'a> {
     Points(&'a PointGroups),

@@ -304,17 +304,20 @@ fn faces_are_cliques_of_spheres_or_of_points() {
 }
 
 #[test]
-fn it_is_said_why_there_are_fewer_spheres() {
-    for (asked, target, reached, ended, said) in [
+fn warnings_explain_fewer_spheres() {
+    for (requested, target, reached, ended, expected) in [
         (10, 10, 10, Ended::AtRest, ""),
         (10, 10, 8, Ended::Stalled, "8 spheres instead of 10: clusters"),
-        (10, 10, 8, Ended::IterationLimit, "8 spheres instead of 10: the rounds"),
+        (10, 10, 8, Ended::IterationLimit, "8 spheres instead of 10: the limit of rounds"),
         (10, 5, 5, Ended::AtRest, "5 spheres instead of 10: more than 5 need"),
         (10, 10, 10, Ended::IterationLimit, "the error is not at rest"),
     ] {
         let mut diagnostics = Diagnostics::default();
-        explain(asked, target, reached, ended, &mut diagnostics);
+        explain(requested, target, reached, ended, &mut diagnostics);
         let warnings = diagnostics.warnings.concat();
-        assert!(warnings.contains(said) && warnings.is_empty() == said.is_empty(), "{warnings}");
+        assert!(
+            warnings.contains(expected) && warnings.is_empty() == expected.is_empty(),
+            "{warnings}"
+        );
     }
 }

@@ -1,12 +1,12 @@
-//! Two sets of records of one study, an older and a newer one: what became worse, better, or merely different.
+//! Two sets of records of one study, an older and a newer one: regressions, improvements and other changes.
 //!
-//! 1. **Pairs** (`results`): records of one mesh, row, level and seed, measured under the same settings. What has no
-//!    partner, or one that cannot be compared, is named with the reason.
-//! 2. **What is deterministic** (`results`): results, errors, counts, topology. Compared exactly; every change is listed,
-//!    and called a regression where it is for the worse by more than its threshold.
-//! 3. **Seconds** (`timing`): the same work takes other seconds each time. A slowdown in CPU seconds is called a
+//! 1. **Pairs** (`results`): records of one mesh, row, level and seed, measured under the same settings. Records
+//!    without a partner or with other settings are listed with the reason.
+//! 2. **Deterministic values** (`results`): results, errors, counts, topology. Compared exactly; every change is
+//!    listed, and is a regression if it is for the worse by more than its threshold.
+//! 3. **Seconds** (`timing`): the same work takes other seconds each time. A slowdown in CPU seconds is reported as a
 //!    regression only if its confidence interval lies beyond a threshold, and the repetitions agree. Wall-clock seconds
-//!    are shown and are no gate.
+//!    are shown, but never are a regression.
 
 mod results;
 mod text;
@@ -23,7 +23,7 @@ use results::Pairs;
 
 pub use timing::Timing;
 
-/// From which on a change for the worse is a regression, all as fractions.
+/// Thresholds beyond which a change for the worse is a regression, all as fractions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DiffOptions {
     /// Errors.
@@ -32,7 +32,7 @@ pub struct DiffOptions {
     pub memory: f64,
     /// CPU seconds of a method over all meshes; twice as much on a single mesh.
     pub seconds: f64,
-    /// Whether repetition `k` of both sides ran right after each other, so that they are compared in pairs.
+    /// Whether repetition `k` of both sides ran in direct succession, so that they are compared in pairs.
     pub alternating: bool,
 }
 
@@ -42,7 +42,7 @@ impl Default for DiffOptions {
     }
 }
 
-/// What a change means.
+/// The direction of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Meaning {
@@ -57,7 +57,7 @@ pub enum Meaning {
 /// One of the two sets of records.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Side {
-    /// What it is called, such as its folder.
+    /// Name, such as its folder.
     pub name: String,
     /// Records that count.
     pub records: usize,
@@ -74,13 +74,13 @@ pub struct Side {
 pub struct ItemName {
     /// The mesh.
     pub mesh: String,
-    /// The method with its parameters, or the name that it was given.
+    /// The method with its parameters, or its name.
     pub method: String,
-    /// What was asked.
+    /// The requested level.
     pub level: String,
 }
 
-/// One quantity that is not as it was.
+/// One changed quantity.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
     /// The result.
@@ -94,7 +94,7 @@ pub struct Change {
     pub new: Value,
     /// The change as a fraction of the older value, for numbers.
     pub relative: Option<f64>,
-    /// What that means.
+    /// Its direction.
     pub meaning: Meaning,
 }
 
@@ -104,7 +104,7 @@ pub struct Unlike {
     /// The result.
     #[serde(flatten)]
     pub item: ItemName,
-    /// Why not.
+    /// The reason.
     pub why: String,
 }
 
@@ -117,13 +117,13 @@ pub struct Diff {
     pub options: DiffOptions,
     /// Pairs that were compared.
     pub compared: usize,
-    /// Results that only the older one has.
+    /// Results of the older set alone.
     pub missing: Vec<ItemName>,
-    /// Results that only the newer one has.
+    /// Results of the newer set alone.
     pub added: Vec<ItemName>,
-    /// Results that both have, under other conditions.
+    /// Results of both sets, under other conditions.
     pub unlike: Vec<Unlike>,
-    /// Changes of what is deterministic, and of memory beyond its threshold; those for the worse first.
+    /// Changes of deterministic values, and of memory beyond its threshold; those for the worse first.
     pub changes: Vec<Change>,
     /// Seconds.
     pub timings: Vec<Timing>,

@@ -1,4 +1,4 @@
-//! Results of both sets: which record of one belongs to which of the other, and what differs between them.
+//! Results of both sets: pairs of records, and their differences.
 //!
 //! The same input always gives the same result, so that any difference is one of the program and needs no statistics.
 
@@ -14,7 +14,7 @@ use crate::metric::METRICS;
 use crate::record::Record;
 use crate::text::printable;
 
-/// Records of both sets, sorted out.
+/// Paired and unpaired records of both sets.
 pub(super) struct Pairs<'a> {
     /// Comparable ones, the older first.
     pub(super) both: Vec<Pair<'a>>,
@@ -31,19 +31,19 @@ pub(super) struct Pair<'a> {
 }
 
 /// The request, which is the same in both sets: mesh, row, seed, level. Counts are from many to few, before other levels.
-type Asked<'a> = (&'a str, String, u64, (Reverse<usize>, String));
+type Request<'a> = (&'a str, String, u64, (Reverse<usize>, String));
 
 /// How it was run and measured, by name: has to agree.
 type Settings = [(&'static str, String); 4];
 
-type Arranged<'a> = BTreeMap<Asked<'a>, BTreeMap<Settings, &'a Record>>;
+type Arranged<'a> = BTreeMap<Request<'a>, BTreeMap<Settings, &'a Record>>;
 
 impl<'a> Pairs<'a> {
     pub(super) fn new(old: &'a [Record], new: &'a [Record]) -> Self {
         let (old, mut new) = (arranged(old), arranged(new));
         let mut pairs = Self { both: vec![], missing: vec![], added: vec![], unlike: vec![] };
-        for (asked, old) in old {
-            let new = new.remove(&asked).unwrap_or_default(); // what is left was added
+        for (request, old) in old {
+            let new = new.remove(&request).unwrap_or_default();
             for (settings, old) in &old {
                 let item = name(old);
                 match (new.get(settings), new.first_key_value()) {
@@ -65,7 +65,7 @@ impl<'a> Pairs<'a> {
     }
 }
 
-/// The records that count: of several of one question and one way of running the last one.
+/// The last record of each result and settings.
 fn arranged(records: &[Record]) -> Arranged<'_> {
     let mut arranged = Arranged::new();
     for record in records {
@@ -73,8 +73,8 @@ fn arranged(records: &[Record]) -> Arranged<'_> {
             Target::Spheres(count) => (Reverse(count), String::new()),
             level => (Reverse(0), level_label(level)),
         };
-        let asked = (record.mesh.as_str(), row_name(record), record.simplify.seed, level);
-        arranged.entry(asked).or_default().insert(settings(record), record);
+        let request = (record.mesh.as_str(), row_name(record), record.simplify.seed, level);
+        arranged.entry(request).or_default().insert(settings(record), record);
     }
     arranged
 }
@@ -104,7 +104,7 @@ fn settings(record: &Record) -> Settings {
     ]
 }
 
-/// In words, what the newer settings have otherwise.
+/// The first difference of the newer settings, in words.
 fn differences(old: &Settings, new: &Settings) -> String {
     let differing = old.iter().zip(new).filter(|(old, new)| old != new);
     let lines = differing.map(|((what, old), (_, new))| format!("{what} {new}, {old} before"));
@@ -146,7 +146,7 @@ fn change(pair: &Pair<'_>, what: String, old: Value, new: Value, options: &DiffO
     Change { item: pair.item.clone(), what, old, new, relative, meaning }
 }
 
-/// What a change of a quantity means.
+/// The direction of a quantity's change.
 fn meaning(pair: &Pair<'_>, what: &str, [old, new]: [&Value; 2], options: &DiffOptions) -> Meaning {
     let key = what.strip_prefix("evaluate.").unwrap_or(what);
     let is_bounded = matches!(pair.old.simplify.level, Target::MaxError(_));
@@ -188,7 +188,7 @@ fn of_size(old: &Value, new: &Value, share: f64, least: f64) -> Meaning {
     }
 }
 
-/// The parts of a record that are compared, one by one: seconds stand between them, and differ from run to run.
+/// The parts of a record that are compared, one by one: seconds differ from run to run and are left out.
 const COMPARED: [&str; 12] = [
     "status",
     "result_hash",
@@ -204,7 +204,7 @@ const COMPARED: [&str; 12] = [
     "initial",
 ];
 
-/// Every compared number of a record, by its key.
+/// Every compared number of a record, by key.
 fn facts(record: &Record) -> BTreeMap<String, Value> {
     let mut facts = BTreeMap::new();
     // A record that was read from JSON can be written as such.

@@ -1,4 +1,4 @@
-//! A difference as Markdown: the verdict first, then what it rests on.
+//! A difference as Markdown: the summary line first, then the evidence.
 
 use serde_json::Value;
 
@@ -45,7 +45,7 @@ pub(super) fn markdown(diff: &Diff) -> String {
 fn heading(diff: &Diff) -> String {
     let [worse, better, changed] = [Meaning::Regression, Meaning::Improvement, Meaning::Changed]
         .map(|meaning| diff.count(meaning));
-    let verdict = match worse {
+    let summary = match worse {
         0 if diff.compared == 0 => "Nothing could be compared".to_owned(),
         0 => "No regression".to_owned(),
         worse => counted(worse, "regression", "regressions"),
@@ -53,12 +53,12 @@ fn heading(diff: &Diff) -> String {
     let compared = counted(diff.compared, "result", "results");
     let better = counted(better, "improvement", "improvements");
     format!(
-        "{verdict}; {better}, {}, among {compared}",
+        "{summary}; {better}, {}, among {compared}",
         counted(changed, "other change", "other changes")
     )
 }
 
-/// What is compared with what.
+/// Both sets: name, builds, machines.
 fn sides(diff: &Diff) -> String {
     let lines = diff.sides.iter().zip(["old", "new"]).map(|(side, which)| {
         let builds: Vec<String> = side.builds.iter().map(|hash| format!("{hash:.12}")).collect();

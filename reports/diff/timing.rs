@@ -12,12 +12,11 @@
 //! A difference has dozens of rows, of which none may raise a false alarm: the intervals hold together (C. E. Bonferroni,
 //! 1936), so that each is wider the more rows there are.
 //!
-//! With builds that ran alternately, repetition `k` of one is compared with repetition `k` of the other: whatever
-//! slowed the machine in that moment slowed both. Otherwise a machine that was busier on one of the two days cannot be
-//! told from a slower program.
+//! With builds that ran alternately, repetition `k` of one is compared with repetition `k` of the other, since load
+//! on the machine slows both. Otherwise a busier machine looks like a slower program.
 //!
-//! The method's own time counts. Substrates, which methods share, have their own row. Wall-clock seconds are shown and
-//! have no meaning here.
+//! The method's own time counts. Shared substrates have a separate row. Wall-clock seconds are shown, but never are a
+//! regression.
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
@@ -29,7 +28,7 @@ use super::{DiffOptions, ItemName, Meaning};
 use crate::metric::median;
 use crate::record::{Record, Repetition, Stages};
 
-/// With fewer repetitions nothing is said.
+/// With fewer repetitions seconds are not compared.
 const LEAST_REPETITIONS: usize = 5;
 
 /// Probability that any interval of a difference misses its ratio, at most.
@@ -38,10 +37,10 @@ const ERROR_RATE: f64 = 0.01;
 /// Share of the repetitions that have to agree.
 const AGREEMENT: f64 = 0.9;
 
-/// Shorter times are not compared: they are of the size of what the clock and the caches do.
+/// Shorter times are not compared: they are of the size of effects of clock and caches.
 const LEAST_SECONDS: f64 = 2e-3;
 
-/// The row of what methods share.
+/// The row of the shared substrates.
 const SUBSTRATES: &str = "(substrates)";
 
 /// How the seconds of a method changed.
@@ -49,7 +48,7 @@ const SUBSTRATES: &str = "(substrates)";
 pub struct Timing {
     /// The row of the method, or `(substrates)`.
     pub method: String,
-    /// The one mesh that this is about; all of them without.
+    /// The mesh of the row; `None` for the row over all meshes.
     pub mesh: Option<String>,
     /// `cpu` or `wall`.
     pub clock: &'static str,
@@ -63,7 +62,7 @@ pub struct Timing {
     pub interval: [f64; 2],
     /// Share of the repetitions that are on the same side of 1 as the ratio.
     pub agreement: f64,
-    /// What it means; nothing where it is within the threshold, or not certain.
+    /// Regression or improvement; `None` within the threshold, or if not certain.
     pub meaning: Option<Meaning>,
 }
 
@@ -75,10 +74,10 @@ const CLOCKS: [(&str, Clock, bool); 2] =
 /// Stages of a repetition by a clock.
 type Clock = fn(&Repetition) -> Stages;
 
-/// The part of the time that a row is about.
+/// The compared part of the time.
 type Part = fn(&Stages) -> f64;
 
-/// What is compared in one row: who, where, and the pairs.
+/// The timed records of one row.
 struct Group<'p, 'a> {
     method: String,
     mesh: Option<String>,
@@ -86,8 +85,8 @@ struct Group<'p, 'a> {
     pairs: Vec<&'p Pair<'a>>,
 }
 
-/// A row for each method over all meshes by each clock, and rows for single meshes where they mean something. And why
-/// some seconds were not compared.
+/// A row for each method over all meshes by each clock, and rows for single meshes with a regression or an
+/// improvement. And the reasons why some seconds were not compared.
 pub(super) fn timings(pairs: &[Pair<'_>], options: &DiffOptions) -> (Vec<Timing>, Vec<String>) {
     let mut untimed = Vec::new(); // reasons, in the order of the checks
     let timed: Vec<&Pair<'_>> = pairs.iter().filter(|pair| alike(pair)).collect();
@@ -104,7 +103,7 @@ pub(super) fn timings(pairs: &[Pair<'_>], options: &DiffOptions) -> (Vec<Timing>
     if repeated.len() < with_result {
         untimed.push(format!(
             "{} of {with_result} pairs have fewer than {LEAST_REPETITIONS} repetitions: seconds vary too much to be \
-             compared; ask for --repeat 10",
+             compared; use --repeat 10",
             with_result - repeated.len()
         ));
     }
@@ -113,7 +112,7 @@ pub(super) fn timings(pairs: &[Pair<'_>], options: &DiffOptions) -> (Vec<Timing>
     let rows = groups.iter().flat_map(|group| {
         CLOCKS.iter().filter_map(move |clock| group.timing(clock, options, error_rate))
     });
-    // Rows of single meshes that mean nothing would bury the others.
+    // Rows of single meshes without a finding would bury the others.
     (rows.filter(|row| row.mesh.is_none() || row.meaning.is_some()).collect(), untimed)
 }
 
@@ -133,7 +132,7 @@ fn repetitions(pair: &Pair<'_>) -> usize {
 /// The pairs by method, and by method and mesh where there are several; the substrates likewise.
 fn groups<'p, 'a>(pairs: &[&'p Pair<'a>]) -> Vec<Group<'p, 'a>> {
     let mut rows: BTreeMap<(&str, Option<&str>), Vec<&'p Pair<'a>>> = BTreeMap::new();
-    // Of each mesh the method that uses most of what is shared.
+    // For each mesh the method with the most time in substrates.
     let mut largest: BTreeMap<&str, &'p Pair<'a>> = BTreeMap::new();
     for pair in pairs {
         let ItemName { mesh, method, .. } = &pair.item;
@@ -316,7 +315,7 @@ mod tests {
     use super::student_quantile;
 
     #[test]
-    fn quantiles_are_those_of_the_tables() {
+    fn quantiles_match_published_tables() {
         for (probability, freedom, expected) in
             [(0.01, 4, 4.6041), (0.01, 9, 3.2498), (0.001, 5, 6.8688), (0.05, 30, 2.0423)]
         {

@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_histories_raise_no_alarm() {
+    fn flat_histories_have_no_change_point() {
         for seed in 1000..1020 {
             assert_eq!(found(&history(seed, |_| 1.0)), [], "seed {seed}");
         }
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn outliers_and_flickering_values_are_no_change() {
+    fn outliers_and_flickering_values_are_not_changes() {
         let mut values = vec![1.0; 60];
         values[30] = 8.0;
         assert_eq!(found(&values), []);

@@ -21,7 +21,7 @@ pub use run::{HistoryError, Point, Run, read_runs};
 
 use crate::metric::median;
 
-/// A change point that is found one run later may lie this many runs beside its earlier place.
+/// A change point that is found one run later may lie this many runs from its earlier place.
 const SAME_PLACE: usize = 3;
 
 /// An error that rises by less than this share is no regression.
@@ -41,7 +41,7 @@ pub struct RunName {
 struct Track<'a> {
     /// Machine and conditions.
     setting: [&'a str; 2],
-    /// Indices of the runs, and what they measured.
+    /// Indices of the runs, and their measurements.
     points: Vec<(usize, &'a Point)>,
 }
 
@@ -53,7 +53,7 @@ pub struct Change {
     pub run: usize,
     /// Mesh, method and level of the series.
     pub series: String,
-    /// What changed: `seconds`, `bytes`, `status`, `hausdorff`, `mean`, `spheres`, `topology` or `result`.
+    /// The changed quantity: `seconds`, `bytes`, `status`, `hausdorff`, `mean`, `spheres`, `topology` or `result`.
     pub what: &'static str,
     /// The value before; of seconds and memory the last one.
     pub from: Value,
@@ -73,7 +73,7 @@ pub struct Change {
     pub news: bool,
 }
 
-/// What the runs of a history show.
+/// Change points and changed results of a history.
 #[derive(Clone, Debug, Serialize)]
 pub struct Findings<'a> {
     /// The runs, the oldest first.
@@ -111,7 +111,7 @@ fn exact(point: &Point) -> [(&'static str, Value); 6] {
 }
 
 impl<'a> Findings<'a> {
-    /// What some runs show, the oldest first. `least_step` is the least change of seconds and memory, as a share.
+    /// Findings in runs, the oldest first. `least_step` is the least change of seconds and memory, as a share.
     pub fn of(runs: &'a [Run], least_step: f64) -> Self {
         let mut tracks: BTreeMap<_, Track<'a>> = BTreeMap::new();
         for (index, run) in runs.iter().enumerate() {

@@ -10,9 +10,9 @@ use crate::text::{counted, escape_html, significant};
 const MOST_ROWS: usize = 40;
 
 impl Findings<'_> {
-    /// The findings as Markdown: first what the newest run brought for the worse.
+    /// The findings as Markdown: regressions of the newest run first.
     pub fn to_markdown(&self) -> String {
-        let mut text = format!("# {}\n\n{}\n", self.title(), self.verdict());
+        let mut text = format!("# {}\n\n{}\n", self.title(), self.summary());
         for line in self.settings() {
             text.push_str(&format!("- {line}\n"));
         }
@@ -22,16 +22,16 @@ impl Findings<'_> {
         text
     }
 
-    /// The findings as a page without a script. `remarks`, such as damaged files, stand above them.
+    /// The findings as a page without a script. `remarks`, such as damaged files, come first.
     pub fn to_html(&self, remarks: &[String]) -> String {
         let style = include_str!("../page/page.css");
         let mut html = format!(
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <title>{title}</title>\n<style>{style}</style>\n</head>\n<body>\n\
-             <header><h1>{title}</h1></header>\n<main>\n<p class=\"notice\"><strong>{verdict}</strong></p>\n",
+             <header><h1>{title}</h1></header>\n<main>\n<p class=\"notice\"><strong>{summary}</strong></p>\n",
             title = escape_html(&self.title()),
-            verdict = escape_html(&self.verdict()),
+            summary = escape_html(&self.summary()),
         );
         for line in remarks.iter().chain(&self.settings()) {
             html.push_str(&format!("<p class=\"notice\">{}</p>\n", escape_html(line)));
@@ -50,8 +50,8 @@ impl Findings<'_> {
         format!("History: {}, {series}", counted(self.runs.len(), "run", "runs"))
     }
 
-    /// What the newest run brought, in one sentence.
-    fn verdict(&self) -> String {
+    /// The findings of the newest run, in one sentence.
+    fn summary(&self) -> String {
         let Some(newest) = self.runs.last() else { return "No run yet.".to_owned() };
         let run = format!("Newest run, {} ({})", newest.date, short(&newest.commit));
         match self.regressions {
@@ -69,7 +69,7 @@ impl Findings<'_> {
             return vec![];
         }
         let lines = settings.iter().map(|[machine, conditions]| {
-            format!("{machine}; {conditions}: compared with itself alone")
+            format!("{machine}; {conditions}: compared only with its own runs")
         });
         lines.collect()
     }

@@ -1,4 +1,4 @@
-//! The file of one run: what one build measured in one study on one machine.
+//! The file of one run: the measurements of one build in one study on one machine.
 //!
 //! A run is `DATE-COMMIT.json` in the folder of the history. It is written once. A damaged file is reported, left out,
 //! and never replaced.
@@ -16,7 +16,7 @@ use crate::metric::median;
 use crate::record::{Machine, Record, Stages, Status};
 use crate::text::printable;
 
-/// Why a run cannot be stored, or a history cannot be read: the file or option, and what is wrong with it.
+/// Why a run cannot be stored, or a history cannot be read: the file or option, and its problem.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct HistoryError(String);
@@ -27,7 +27,7 @@ impl HistoryError {
     }
 }
 
-/// What one build measured in one study.
+/// The measurements of one build in one study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {
     /// Date of the commit, ISO 8601. Runs are sorted by it.
@@ -38,7 +38,7 @@ pub struct Run {
     pub version: String,
     /// Where it ran.
     pub machine: String,
-    /// What results depend on beside mesh, method and level: sampling, samples, seeds, threads.
+    /// Settings of the results except mesh, method and level: sampling, samples, seeds, threads.
     pub conditions: String,
     /// The measured items, sorted by mesh, method and level.
     pub series: Vec<Point>,
@@ -52,11 +52,11 @@ pub struct Point {
     /// First digits of the hash of its content; empty for a run that ended before it was read.
     #[serde(default)]
     pub mesh_hash: String,
-    /// The method with its parameters, or the name that it was given.
+    /// The method with its parameters, or its name.
     pub method: String,
     /// The requested level.
     pub level: String,
-    /// What became of it.
+    /// Status of the item.
     pub status: Status,
     /// CPU seconds of the method without shared substrates, median over the repetitions. For the initial medial mesh,
     /// whose work the substrates are, with them.
@@ -76,8 +76,8 @@ pub struct Point {
 }
 
 impl Run {
-    /// The run that some records are of. Of several records of one item the last one counts, of several builds the one
-    /// that ran last.
+    /// The run of some records. Of several records of one item the last one counts, of several builds the one that
+    /// ran last.
     ///
     /// # Errors
     /// When there is no record, the records are of several machines or studies, or commit or date are malformed.
@@ -112,7 +112,7 @@ impl Run {
             if machine(&record.machine) != run.machine || conditions(record) != run.conditions {
                 let item = format!("{}, {}", point.mesh, point.method);
                 return invalid(format!(
-                    "{item}: not the machine, samples, seeds or threads of the rest"
+                    "{item}: machine, samples, seeds or threads differ from the last record's"
                 ));
             }
             if !point.mesh_hash.is_empty() {
@@ -146,7 +146,7 @@ impl Run {
             Ok(old) if old == text => return Ok((path, false)),
             Ok(_) => {
                 let message =
-                    "this run is stored with other content; remove the file to replace it";
+                    "this run is already stored with other content; remove the file to replace it";
                 return Err(HistoryError::file(&path, message));
             }
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(failed(error)),
@@ -166,7 +166,7 @@ impl Run {
         let is_named = date.len() >= 10 && commit.len() >= 8;
         match is_named && path.file_name().is_some_and(|name| *name == *run.file_name()) {
             true => Ok(run),
-            false => Err(HistoryError::file(path, "date and commit are not those of its name")),
+            false => Err(HistoryError::file(path, "date and commit do not match the file name")),
         }
     }
 }
@@ -239,14 +239,14 @@ fn machine(machine: &Machine) -> String {
 
 fn conditions(record: &Record) -> String {
     // Old records have none.
-    let given = record.conditions.clone().unwrap_or_default();
+    let conditions = record.conditions.clone().unwrap_or_default();
     let seeds: Vec<String> = record.seeds.iter().map(|(of, seed)| format!("{of} {seed}")).collect();
     let threads = record.simplify.threads.map_or("unknown".to_owned(), |n| n.to_string());
     printable(&format!(
         "sampling {}; dual {}; samples {}; seeds {}; threads {threads}",
-        given.sampling,
-        given.dual,
-        given.samples,
+        conditions.sampling,
+        conditions.dual,
+        conditions.samples,
         seeds.join(", ")
     ))
 }

@@ -17,13 +17,13 @@ use serde_json::{Value, json};
 use crate::comparison::{Comparison, level_label};
 use crate::header::{Header, MethodNote, RunNote};
 use crate::metric::{BELOW_30, COMPARED, EPSILON, Metric, SPHERES_ONLY};
-use crate::pictures::most_telling;
+use crate::pictures::widest_spread;
 use crate::plots::{Figure, symbol};
 use crate::record::Machine;
 use crate::tables::Table;
 use crate::text::{betti, counted, escape_html, grouped, printable};
 
-/// Everything that the page is made of.
+/// The content of the page.
 pub(crate) struct Page<'a> {
     pub(crate) header: &'a Header,
     pub(crate) comparison: &'a Comparison<'a>,
@@ -41,7 +41,7 @@ pub(crate) struct Page<'a> {
     pub(crate) bibtex: &'a str,
 }
 
-/// What the page shows of one mesh.
+/// The page's section of one mesh.
 pub(crate) struct MeshPart {
     /// Name of its files.
     pub(crate) stem: String,
@@ -74,15 +74,15 @@ fn packed(id: &str, text: &str) -> String {
     format!("<script type=\"text/plain\" id=\"{id}\">{text}</script>\n")
 }
 
-/// JSON that may stand in an element `script`: no text can end the element or begin a comment, and
-/// no direction mark reorders what is shown.
+/// JSON for an element `script`: no text can end the element or begin a comment, and no direction mark reorders the
+/// display.
 fn embedded(value: &Value) -> String {
     printable(&value.to_string().replace('<', "\\u003c"))
 }
 
 /// The template with its parts.
 fn filled(title: &str, report: &Value, library: String, script: String) -> String {
-    // In their order: no value can be taken for a place of another.
+    // In their order: a value may look like another's place.
     let parts = [
         ("{title}", escape_html(title)),
         ("{style}", include_str!("page.css").to_owned()),
@@ -97,7 +97,7 @@ fn filled(title: &str, report: &Value, library: String, script: String) -> Strin
         let (before, after) = rest.split_once(place).expect("the template has each place");
         html.push_str(before);
         html.push_str(&text);
-        rest = after; // never searched again: a value may look like a place
+        rest = after; // values are never searched
     }
     html + rest
 }
@@ -113,7 +113,7 @@ fn view_element(name: &str, text: &str) -> String {
     format!("<script type=\"text/plain\" class=\"view\" id=\"view-{name}\">{text}</script>\n")
 }
 
-/// A page of one packed 3D view with all its results beside each other.
+/// A page of one packed 3D view with all its results side by side.
 pub(crate) fn page_of_view(title: &str, text: &str) -> String {
     let library = libraries_3d() + &view_element("all", text);
     let show = "document.querySelector(\"main\").append(viewOf({ name: \"all\", all: true }));\n";
@@ -208,7 +208,7 @@ impl Page<'_> {
             "meshes": (0..self.meshes.len()).map(|mesh| self.mesh(mesh)).collect::<Vec<_>>(),
             "answers": self.answers.as_ref().map(without_command),
             "overview": self.overview,
-            "leading": most_telling(comparison, pictured),
+            "leading": widest_spread(comparison, pictured),
             "not_run": is_compared.then(|| json!({
                 "methods": absent.iter().map(|note| described(note)).collect::<Vec<_>>(),
                 "command": header.command_with(&ids),
@@ -252,7 +252,7 @@ impl Page<'_> {
         facts
     }
 
-    /// Why there is no number on the page.
+    /// The reason for a page without a number.
     fn alert(&self) -> Option<String> {
         let runs = self.comparison.entries.len();
         (self.comparison.measured() == 0).then(|| match runs {
@@ -286,8 +286,8 @@ impl Page<'_> {
                 json!(["Betti numbers of the solid", betti(initial.expected_betti)]),
             ];
             if wrong {
-                let verdict = "wrong before any simplification: methods that start here inherit it";
-                facts.push(json!(["topology", verdict, true]));
+                let remark = "wrong before any simplification: methods that start here inherit it";
+                facts.push(json!(["topology", remark, true]));
             }
             facts
         });
@@ -346,7 +346,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn packed_texts_come_back_and_are_the_same_each_time() {
+    fn packing_is_reversible_and_deterministic() {
         let text = "</script><b>\u{e9}".repeat(100);
         let element = packed("rows", &text);
         assert_eq!(element, packed("rows", &text));
@@ -359,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn no_text_can_leave_its_script() {
+    fn text_cannot_close_its_script_element() {
         let text = embedded(&json!({"reason": "</script><!--\u{202e}\n"}));
         assert!(!text.contains(['<', '\u{202e}', '\n']), "{text}");
         let back: Value = serde_json::from_str(&text).unwrap();

@@ -32,23 +32,23 @@ const evaluated = async (id) => {
 
 const report = JSON.parse(document.getElementById("report").textContent);
 
-// The words of the tables that are no metric.
+// Words of the tables that are not metrics.
 const WORDS = [
-  ["requested, spheres", "The requested number of spheres, and the number of the result. Results compare at equal numbers, " +
+  ["requested, spheres", "The requested number of spheres, and that of the result. Results are compared at equal numbers, " +
     "reached to within 2 %."],
   ["%", "Lengths are percentages of the diagonal of the input's bounding box; results.jsonl and results.csv hold them as " +
     "fractions."],
   ["substrate, prepare, simplify", "The stages of the time. Substrates are the parts that methods share (samples, Delaunay " +
-    "triangulation, inside test, initial medial mesh): they count for each method that uses them, whichever method built " +
-    "them first. Then the method's work for all levels, then its work for this level."],
+    "triangulation, inside test, initial medial mesh). Their time counts for each method that uses them, even if another " +
+    "method built them. Prepare is the method's work for all levels, simplify its work for this level."],
   ["Betti", "Betti numbers over Z2 of the medial mesh: components, independent loops, enclosed bubbles. A medial axis has " +
     "those of its solid: components, total genus, cavities."],
-  ["status", "ok; other count: a result with another number of spheres; unsupported: the method does not do this, which is " +
-    "no failure; skipped: the method had used its budget of time on this mesh; refused: the input was not accepted; failed, panicked, timed out, out of memory: the run ended so; " +
-    "invalid output: the output is no medial mesh."],
+  ["status", "ok; other count: a result with another number of spheres; unsupported: the method does not support this, which is " +
+    "no failure; skipped: the time budget of the method on this mesh was used up; refused: the input was rejected; failed, panicked, timed out, out of memory: how the run ended; " +
+    "invalid output: the output is not a valid medial mesh."],
 ];
-const UNITS = "Lengths in % of the bounding-box diagonal of the input; seconds of wall clock, shared substrates included. " +
-  "Arrows: which way is better. Bold: best for this mesh at this number of spheres, among results that reached it to " +
+const UNITS = "Lengths in % of the bounding-box diagonal of the input; wall-clock seconds, shared substrates included. " +
+  "Arrows point in the better direction. Bold: best for this mesh at this number of spheres, among results that reached it to " +
   "within 2 %. †: non-monotone, more than 5 % above the error of the same method with fewer spheres. results.csv holds every " +
   "recorded number.";
 const GLOSSARY = "https://github.com/medial-rs/medial/blob/main/METHODOLOGY.md#glossary";
@@ -93,9 +93,9 @@ const listOf = (pairs) =>
 
 const strip = (mesh, link) => {
   if (!mesh.picture) return null;
-  const words = `${mesh.name}: medial meshes of the same requested number of spheres (in parentheses: another number), the least ` +
+  const words = `${mesh.name}: medial meshes at one requested number of spheres (in parentheses: another number), the least ` +
     "Hausdorff error (in % of the diagonal) first, coloured by radius. Below them the surface: red where the reconstruction reaches beyond it, blue " +
-    "where it falls short. Larger errors than the scale has are drawn in its last colour.";
+    "where it falls short. Errors beyond the scale have its last colour.";
   const image = make("img", { src: mesh.picture, alt: words });
   return make("figure", { class: "strip" }, make("div", {}, link ? make("a", { href: link }, image) : image),
     make("figcaption", {}, words));
@@ -117,22 +117,22 @@ const meshParts = (index, withPicture, plots) => {
 
 // A text with a button that copies it.
 const paste = (title, file, text) => {
-  const said = make("output");
+  const message = make("output");
   const pre = make("pre", { tabindex: 0 }, text);
   const button = make("button", { type: "button" }, "Copy");
   button.addEventListener("click", async () => {
     try {
       // Pages from disk may lack a clipboard, and a browser may refuse it.
       await navigator.clipboard.writeText(text);
-      said.textContent = "Copied.";
+      message.textContent = "Copied.";
     } catch {
       getSelection().selectAllChildren(pre);
       pre.focus();
-      said.textContent = "Selected: copy it by the keyboard.";
+      message.textContent = "Selected: copy it with the keyboard.";
     }
   });
   const link = make("a", { href: file }, file.replace("./", ""));
-  return make("div", { class: "paste" }, make("h3", {}, title), make("p", {}, button, " ", link, " ", said), pre);
+  return make("div", { class: "paste" }, make("h3", {}, title), make("p", {}, button, " ", link, " ", message), pre);
 };
 
 const methodsOf = (methods) => make("dl", {}, ...methods.flatMap(({ id, title, summary, home, published, citation }) => [
@@ -143,7 +143,7 @@ const methodsOf = (methods) => make("dl", {}, ...methods.flatMap(({ id, title, s
 
 // The methods without a result, and how to add them.
 const notRunOf = ({ methods, command }) => {
-  const end = methods.length > 3 ? /[,;:.]/ : /\./; // of a few methods also what they cost
+  const end = methods.length > 3 ? /[,;:.]/ : /\./; // of a few methods also their cost
   const named = methods.map(({ id, home }) => home ? `${id} (${home[0].toLowerCase()}${home.slice(1).split(end)[0]})` : id);
   return make("div", { class: "notrun" }, make("p", {}, make("strong", {}, "Not run: "), named.join(", "),
     ". This command adds the missing results to this page:"), code(command));
@@ -166,7 +166,7 @@ const meshFolds = (bulk) => report.meshes.map((mesh, index) => late(
       make("a", { href: `./tables/mesh-${mesh.stem}.md` }, "Markdown"), ", ",
       make("a", { href: `./tables/mesh-${mesh.stem}.tex` }, "LaTeX"))]));
 
-// Opens what the address names, with the folds around it.
+// Opens the element of the address, with the folds around it.
 const openTarget = () => {
   let id = location.hash.slice(1).split("?")[0];
   try {
@@ -213,7 +213,7 @@ const start = async () => {
   if (report.answers || report.not_run) {
     const table = report.answers ?? { columns: [], rows: [], notes: [] };
     parts.push(section("answers", "Which method?", report.answers && tableOf(table), report.not_run && notRunOf(report.not_run),
-      table.notes.length ? fold(null, "How these are decided", ...table.notes.map(note)) : null));
+      table.notes.length ? fold(null, "How the methods are ranked", ...table.notes.map(note)) : null));
   }
   if (isOne) {
     const inner = meshParts(0, true, []).filter(Boolean);
@@ -221,7 +221,7 @@ const start = async () => {
   } else if (report.leading !== null) {
     const mesh = report.meshes[report.leading];
     const way = make("a", { href: "#meshes" }, "Pictures, 3D views and curves of each mesh");
-    const why = `Shown is ${mesh.name}: of the meshes on which most methods ran, the one on which their errors differ most. `;
+    const why = `${mesh.name} is shown: among the meshes that most methods ran on, the one with the largest spread of errors. `;
     parts.push(section("pictures", "Pictures", strip(mesh, `#mesh-${mesh.stem}`), mesh.view && viewOf(mesh.view), make("p", {}, why, way)));
   }
   if (curves.length) parts.push(section("curves", "Error against spheres and time", plotsOf(curves)));
@@ -238,7 +238,7 @@ const start = async () => {
   if (report.methods.length) folds.push(fold("methods", "Methods", methodsOf(report.methods)));
   if (report.not_run) folds.push(fold("not-run", "Methods that were not run", methodsOf(report.not_run.methods), code(report.not_run.command)));
   folds.push(fold("definitions", "Definitions", listOf([...report.definitions, ...WORDS]),
-    make("p", {}, "Further words: ", make("a", { href: GLOSSARY }, "the glossary"), ".")));
+    make("p", {}, "More terms: ", make("a", { href: GLOSSARY }, "the glossary"), ".")));
   if (report.papers) {
     const about = "plots/ holds all plots as SVG, lettered in Helvetica, Arial or another sans-serif; tables/ holds all " +
       "tables as LaTeX for \\input. They need no package; booktabs gives finer rules, graphicx shrinks wide tables to the " +

@@ -1,4 +1,4 @@
-// Plots by Observable Plot, with what it leaves out: series to hide, areas to enlarge, and points
+// Plots by Observable Plot, with additions: series to hide, areas to enlarge, and points
 // that the keyboard reaches.
 const plotsOf = (figures) => make("div", { class: "plots" }, ...figures.map(plotOf));
 
@@ -42,9 +42,9 @@ const plotOf = (figure) => {
   // Tags that cover no other one.
   const apart = () => {
     const share = (tag, key) => (tag[key] - view[key][0]) / (view[key][1] - view[key][0]);
-    return tags.filter(isInside).reduce((kept, tag) => (kept.some((other) =>
+    return tags.filter(isInside).reduce((visible, tag) => (visible.some((other) =>
       Math.abs(share(tag, "u") - share(other, "u")) < 0.07 && Math.abs(share(tag, "v") - share(other, "v")) < 0.04)
-      ? kept : [...kept, tag]), []);
+      ? visible : [...visible, tag]), []);
   };
 
   const words = ({ x, y, n, spheres, isRising, curve }) => {
@@ -56,7 +56,7 @@ const plotOf = (figure) => {
   };
 
   const box = make("figure", { class: "plot" });
-  const said = make("output", { class: "unseen" });
+  const announcement = make("output", { class: "unseen" });
   const colour = ({ curve }) => report.series[curve.series].colour;
   const draw = () => {
     const seen = points.filter(isInside);
@@ -94,7 +94,7 @@ const plotOf = (figure) => {
     if (chart) chart.replaceWith(svg);
     chart = svg;
     reset.hidden = view === whole;
-    said.textContent = chosen.length ? words(current) : "";
+    announcement.textContent = chosen.length ? words(current) : "";
     if (hadFocus) svg.focus({ preventScroll: true });
     return svg;
   };
@@ -221,6 +221,6 @@ const plotOf = (figure) => {
   if (points.some((point) => point.isRising)) legend.append(make("span", { class: "rising" }, "non-monotone: error above that of fewer spheres"));
   const tools = make("div", { class: "tools" }, reset, button("−", "show more", () => zoom(0.5)), button("+", "enlarge", () => zoom(2)));
   stage.append(draw());
-  box.append(make("figcaption", {}, figure.title, tools), stage, legend, said);
+  box.append(make("figcaption", {}, figure.title, tools), stage, legend, announcement);
   return box;
 };

@@ -7,10 +7,10 @@ use serde_json::{Value, json};
 use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::metric::COMPARED;
 use crate::record::{Record, Target};
-use crate::tables::{Best, flatten, remark, topology_verdict, warnings};
+use crate::tables::{Best, flatten, remark, topology_word, warnings};
 use crate::text::significant;
 
-/// A table of more results takes a browser's memory and minutes.
+/// A larger table would exhaust a browser's memory.
 pub(super) const MOST: usize = 20_000;
 
 /// The columns of all entries by path, null where a record has no value. Below `table` are those of the table of
@@ -59,7 +59,7 @@ fn row(comparison: &Comparison<'_>, entry: &Entry<'_>, best: &Best) -> Vec<(Stri
         ("count", json!(count)),
         ("status", json!(record.status.to_string())),
         ("spheres", json!(reached(record))),
-        ("topology", json!(topology_verdict(entry))),
+        ("topology", json!(topology_word(entry))),
         ("rising", json!(comparison.is_rising(entry).then_some(1))),
         ("remark", json!(remark(entry))),
         ("link", json!(record.artifact.as_deref().and_then(local_link))),
@@ -70,15 +70,15 @@ fn row(comparison: &Comparison<'_>, entry: &Entry<'_>, best: &Best) -> Vec<(Stri
     row
 }
 
-/// A link to a file in the folder of the page, percent-encoded. `None` for a path that leaves that
-/// folder, such as `../`, or is none, such as `javascript:`.
+/// A link to a file in the folder of the page, percent-encoded. `None` for a path that leaves that folder, such as
+/// `../`, or is another address, such as `javascript:`.
 pub(super) fn local_link(path: &str) -> Option<String> {
     let inside = !path.is_empty()
         && !path.starts_with('/')
         && !path.contains('\\')
         && path.split('/').all(|part| !part.is_empty() && part != ".." && part != ".");
     if !inside {
-        return None; // no link is better than one that leads out
+        return None; // never link outside the folder
     }
     let mut link = String::from("./");
     for byte in path.bytes() {
@@ -138,7 +138,7 @@ fn mesh_argument(record: &Record) -> String {
     }
 }
 
-/// The name of the mesh that a word of a command line stands for.
+/// The name of the mesh of a command-line word.
 fn mesh_name(word: &str) -> Option<String> {
     if let Some(spec) = word.strip_prefix("builtin:") {
         return Some(spec.replacen(':', "-", 1));
@@ -153,7 +153,7 @@ fn mesh_name(word: &str) -> Option<String> {
 
 /// A word as a shell takes it.
 fn quoted(word: &str) -> String {
-    // What no shell interprets; everything else stands in single quotes.
+    // Words with other characters need single quotes.
     let is_plain = word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c));
     if is_plain && !word.is_empty() {
         word.to_owned()

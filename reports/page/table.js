@@ -1,4 +1,4 @@
-// The table of all results. Only the rows near those in sight stand in the document: laying out a
+// The table of all results. Only the rows near those in sight are in the document: laying out a
 // table costs far more than choosing and ordering its rows.
 const resultsOf = (bulk) => {
   const CHUNK = 250;
@@ -109,10 +109,10 @@ const resultsOf = (bulk) => {
     });
   };
   const chosen = () => {
-    const asked = FACETS.map((name) => [texts[name], form.elements[name].value]).filter(([, value]) => value !== "");
+    const criteria = FACETS.map((name) => [texts[name], form.elements[name].value]).filter(([, value]) => value !== "");
     const words = form.elements.text.value.toLowerCase().split(/\s+/).filter(Boolean);
     const searching = words.length ? searched() : null;
-    return order.filter((row) => asked.every(([value, wanted]) => value(row) === wanted) &&
+    return order.filter((row) => criteria.every(([value, wanted]) => value(row) === wanted) &&
       words.every((word) => searching[row].includes(word)));
   };
 
@@ -134,9 +134,9 @@ const resultsOf = (bulk) => {
   };
   const opened = new Map();
   const rowOf = (row) => {
-    const [mesh, method, asked] = ["mesh", "method", "asked"].map((key) => texts[key](row));
+    const [mesh, method, level] = ["mesh", "method", "asked"].map((key) => texts[key](row));
     const more = make("button", { type: "button", class: "more", "aria-expanded": String(opened.has(row)),
-      "aria-label": `details of ${mesh}, ${method}, ${asked}` });
+      "aria-label": `details of ${mesh}, ${method}, ${level}` });
     const element = make("tr", { "data-mesh": mesh, "data-method": method },
       make("th", { scope: "row" }, more, make("a", { href: `#mesh-${report.meshes[table.mesh(row)].stem}` }, mesh)),
       ...columns.slice(1).map((column) => cellOf(row, column)));
@@ -179,7 +179,7 @@ const resultsOf = (bulk) => {
     { root: box, rootMargin: "800px" }).observe(rest);
   window.addEventListener("beforeprint", () => more(Infinity));
 
-  // Everything that was recorded of a row, by the parts of the record.
+  // All recorded values of a row, by the parts of the record.
   const detailOf = (row) => {
     const groups = new Map();
     for (const path of Object.keys(bulk.columns)) {
@@ -211,7 +211,7 @@ const resultsOf = (bulk) => {
     rules.textContent = left.map((place) => `.sortable > * > tr:not(.detail, .rest) > :nth-child(${place}) { display: none; }`).join("\n");
   };
 
-  // The state stands in the address: #results?method=qmat&asked=100&sort=-hausdorff.
+  // The address stores the state: #results?method=qmat&asked=100&sort=-hausdorff.
   const PREFIX = "#results?";
   const write = () => {
     const state = new URLSearchParams();
@@ -224,7 +224,7 @@ const resultsOf = (bulk) => {
     }
     const words = state.toString();
     if (!words && !location.hash.startsWith(PREFIX)) return;
-    // A page from some places may not change its address: the state is then not kept.
+    // A page from some places may not change its address: the state is then lost.
     try { history.replaceState(null, "", words ? PREFIX + words : "#results"); } catch { }
   };
   const read = () => {
@@ -278,7 +278,7 @@ const resultsOf = (bulk) => {
   window.addEventListener("hashchange", read);
   chooseColumns();
   show();
-  // The address may name rows: read once the table stands in the document.
+  // The address may name rows: read after the table is in the document.
   queueMicrotask(read);
   return [form, box, note(UNITS)];
 };

@@ -190,7 +190,7 @@ const viewOf = (() => {
       }
       return [coloured(soup), balls(result, () => 2.4 * thin), glass()];
     };
-    // The union: what primitives hide of each other, the depth buffer hides.
+    // The union: the depth buffer removes hidden parts of primitives.
     const union = (result) => {
       const soup = new Soup();
       const sides = sidesOf(result);
@@ -234,7 +234,7 @@ const viewOf = (() => {
   ];
   const percent = (value) => `${Number(value.toPrecision(2))} %`;
 
-  // One camera for both sides. What the picture must hold in the first view decides its width.
+  // One camera for both sides. The content of the first view decides its width.
   const cameraOf = (T, view) => {
     const camera = new T.OrthographicCamera();
     const direction = new T.Vector3(...view.direction).normalize();
@@ -269,7 +269,7 @@ const viewOf = (() => {
       this.canvas = make("canvas", { tabindex: 0 });
       this.caption = make("figcaption");
       this.figure = make("figure", { class: "side" }, make("div", { class: "bar" }, this.of, this.kind), this.canvas, this.caption);
-      // Kept, so that the picture can be copied out of the page.
+      // Preserved, so that the picture can be copied out of the page.
       this.renderer = new T.WebGLRenderer({ canvas: this.canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
       this.scene = new T.Scene();
       this.light = new T.DirectionalLight(0xffffff, 2.1);

@@ -58,7 +58,7 @@ impl Axis {
             Scale::Linear => value,
         });
         let place = (at - low) / (high - low);
-        // What has no logarithm goes to the lower end.
+        // Values without a logarithm go to the lower end.
         if place.is_finite() { place.clamp(0.0, 1.0) } else { 0.0 }
     }
 }

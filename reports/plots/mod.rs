@@ -1,4 +1,4 @@
-//! Plots: what stands in them. The page draws a [`Figure`] from its JSON, `svg` draws it for papers.
+//! Plots. The page draws a [`Figure`] from its JSON, `svg` draws it for papers.
 //!
 //! Every number of a figure is computed here, so both drawings show the same points, the same
 //! labels.
@@ -81,7 +81,7 @@ impl Figure {
     }
 }
 
-/// A family of figures, one for each mesh and one of the means over all: name, title, and the metric upwards.
+/// A kind of figures, one for each mesh and one of the means over all: name, title, and the metric upwards.
 struct Kind(&'static str, &'static str, &'static Metric);
 
 const KINDS: [Kind; 5] = [

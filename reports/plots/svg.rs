@@ -168,7 +168,7 @@ impl Figure {
     }
 }
 
-/// What marks an error that rises with the number of spheres, around a marker.
+/// The mark of an error that rises with the number of spheres, around a marker.
 fn ring(at: (i32, i32)) -> Circle<(i32, i32), i32> {
     Circle::new(at, 15, INK.stroke_width(2))
 }

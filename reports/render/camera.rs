@@ -14,7 +14,7 @@ use super::RenderError;
 pub struct Camera {
     /// From the shape to the eye, of any length.
     pub direction: Vec3,
-    /// What is up on the picture, not along the direction.
+    /// Upward direction on the picture, not parallel to the viewing direction.
     pub up: Vec3,
     /// 1: the shape fills the picture; 2: twice as large.
     pub zoom: f64,
@@ -23,8 +23,8 @@ pub struct Camera {
 /// Accepted zooms: coordinates on the picture must stay in the range of exact arithmetic.
 const ZOOMS: std::ops::RangeInclusive<f64> = 0.05..=50.0;
 
-/// A principal box whose volume is below this share of the coordinate box means that the shape lies askew. Above it the
-/// coordinates of the file are the better guess of how it stands.
+/// Below this ratio of the principal box's volume to the coordinate box's the shape is rotated. Above it the
+/// coordinates of the file give the better upright position.
 const ASKEW: f64 = 0.6;
 
 /// How far the default camera goes around the shape, and how far up, in degrees: all three sides are seen, the widest
@@ -68,7 +68,7 @@ fn around(across: Vec3, up: Vec3, towards: Vec3, (azimuth, elevation): (f64, f64
     lift.cos() * (turn.sin() * across + turn.cos() * towards) + lift.sin() * up
 }
 
-/// Across, up, and towards the eye, for a shape as it seems to stand.
+/// Across, up, and towards the eye, for a shape in its upright position.
 fn standing_axes(mesh: &TriMesh) -> [Vec3; 3] {
     let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| extent(mesh, axis));
     let principal = principal_axes(mesh);
@@ -154,7 +154,7 @@ impl Frame {
     pub fn fit(camera: &Camera, points: &[Vec3]) -> Result<Self, RenderError> {
         let &Camera { direction, up, zoom } = camera;
         let back = direction.try_normalize().ok_or(RenderError::Direction(words(direction)))?;
-        // Nearly along the line of sight, rounding would decide what is up.
+        // Nearly along the line of sight, rounding would decide the upward direction.
         let across = up.try_normalize().map_or(Vec3::ZERO, |up| up.cross(back));
         if across.length() < 1e-3 {
             return Err(RenderError::Up(words(up)));
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_that_lies_askew_is_looked_at_along_its_shortest_side() {
+    fn a_rotated_box_is_viewed_along_its_shortest_side() {
         let turn = medial::geometry::glam::DQuat::from_rotation_z(0.7);
         let corner = |k: u32| {
             let sign = |bit: u32| if k >> bit & 1 == 0 { -1.0 } else { 1.0 };

@@ -34,7 +34,9 @@ const FEWEST_PIXELS: usize = 16;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RenderError {
     /// A side of the picture is too short or too long.
-    #[error("a picture of {width} by {height} pixels: expected 16 to {MOST_PIXELS} pixels a side")]
+    #[error(
+        "a picture of {width} by {height} pixels: out of range (expected 16 to {MOST_PIXELS} a side)"
+    )]
     Size {
         /// Width in pixels.
         width: usize,
@@ -42,23 +44,21 @@ pub enum RenderError {
         height: usize,
     },
     /// The camera has no direction.
-    #[error(
-        "the camera looks from {0}, which is no direction: expected three numbers, not all zero"
-    )]
+    #[error("the camera looks from {0}: not a direction (expected three numbers, not all zero)")]
     Direction(String),
     /// The camera has no upward direction.
-    #[error(
-        "{0} does not point upwards for this camera: expected a direction across the line of sight"
-    )]
+    #[error("{0}: not an upward direction (found a line of sight, expected a direction across it)")]
     Up(String),
     /// The zoom is out of range.
-    #[error("a zoom of {0}: expected 0.05 to 50")]
+    #[error("a zoom of {0}: out of range (expected 0.05 to 50)")]
     Zoom(f64),
     /// There is no finite point to set the camera up by.
-    #[error("nothing to draw: no point, or none that is finite")]
+    #[error("nothing to draw: no finite point")]
     Empty,
-    /// The values of a layer are not one for each vertex.
-    #[error("{values} values for {vertices} vertices")]
+    /// A layer has another number of values than vertices.
+    #[error(
+        "values of a layer: wrong number (found {values}, expected {vertices}, one for each vertex)"
+    )]
     Values {
         /// Number of values.
         values: usize,

@@ -9,7 +9,7 @@ use super::RenderError;
 use super::scene::Scale;
 use crate::text::round_steps;
 
-/// What is behind everything.
+/// The background of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Background {
     /// Nothing: alpha 0.
@@ -107,7 +107,7 @@ impl Picture {
             for (row, column) in rows.flat_map(|row| columns.clone().map(move |c| (row, c))) {
                 let ink_sum: u32 = (0..FINE * FINE)
                     .filter_map(|k| {
-                        // The glyph seldom fills whole pixels: what is outside of it has no ink.
+                        // A glyph rarely fills whole pixels: outside of it there is no ink.
                         let u = usize::try_from(FINE * column + k % FINE - left).ok()?;
                         let v = usize::try_from(FINE * row + k / FINE - top).ok()?;
                         (u < metrics.width).then(|| texels.get(v * metrics.width + u)).flatten()
@@ -126,11 +126,11 @@ impl Picture {
     /// # Errors
     /// [`RenderError::Png`] when it cannot be encoded.
     pub fn to_png(&self) -> Result<Vec<u8>, RenderError> {
-        // Without alpha where it says nothing: a quarter less to store.
+        // Without alpha where all pixels are opaque: a quarter less to store.
         let opaque = self.pixels.iter().all(|pixel| pixel[3] == 255);
-        let kept = if opaque { 3 } else { 4 };
+        let channels = if opaque { 3 } else { 4 };
         let data: Vec<u8> =
-            self.pixels.iter().flat_map(|pixel| pixel[..kept].iter().copied()).collect();
+            self.pixels.iter().flat_map(|pixel| pixel[..channels].iter().copied()).collect();
         let mut bytes = Vec::new();
         let mut encoder = Encoder::new(&mut bytes, self.width as u32, self.height as u32);
         encoder.set_color(if opaque { ColorType::Rgb } else { ColorType::Rgba });

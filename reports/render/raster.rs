@@ -43,12 +43,12 @@ pub(super) struct Look {
     pub(super) kind: Kind,
 }
 
-/// How a batch hides what is behind it.
+/// How a batch hides facets behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Wholly.
     Solid,
-    /// Hardly.
+    /// Almost not.
     Glass,
     /// As glass, and seen only where nothing solid is, before or behind.
     Ghost,
@@ -73,7 +73,7 @@ const BAND: usize = 16;
 /// No facet.
 const NONE: u32 = u32::MAX;
 
-/// What a pixel shows, as means over its samples.
+/// The content of a pixel, as means over its samples.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PixelLight {
     /// Light of the solid facets, after the glass in front of them.
@@ -133,7 +133,7 @@ fn by_band(facets: &[PlacedFacet], height: usize) -> Vec<Vec<u32>> {
     lists
 }
 
-/// What the bands have in common.
+/// Shared data of the bands.
 struct FacetPicture<'a> {
     facets: &'a [PlacedFacet],
     looks: &'a [Look],
@@ -246,7 +246,7 @@ impl Band {
                 share.mask |= 1 << k;
             }
             let depth = -self.nearness[sample] as f32;
-            sum.covered += 1.0; // whatever glass is in front
+            sum.covered += 1.0; // also behind glass
             sum.depth += depth;
             sum.farthest = sum.farthest.max(depth);
         }

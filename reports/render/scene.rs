@@ -1,4 +1,4 @@
-//! The scene: what can be drawn, and the facets that it becomes.
+//! The scene: drawable layers, and their facets.
 
 use medial::complex::{MedialMesh, Sphere};
 use medial::geometry::DisjointSets;
@@ -12,14 +12,14 @@ use super::picture::{Background, Picture};
 use super::raster::{Batch, Facet, Kind, Look, PixelLight, rasterise};
 use super::{FEWEST_PIXELS, MOST_PIXELS, RenderError};
 
-/// What a picture is of, but for the camera.
+/// A picture's content, without the camera.
 #[derive(Clone, Debug)]
 pub struct Scene<'a> {
-    /// What is drawn. All in one unit.
+    /// The drawn layers, all in one unit.
     pub layers: Vec<Layer<'a>>,
     /// Width and height in pixels.
     pub size: [usize; 2],
-    /// What is behind everything.
+    /// The background.
     pub background: Background,
 }
 
@@ -30,7 +30,7 @@ pub enum Layer<'a> {
     Surface(&'a TriMesh),
     /// A closed surface as faint glass: its rims and its sharp edges, with the inside visible.
     Glass(&'a TriMesh),
-    /// A closed surface as glass where nothing else is: what a reconstruction lacks.
+    /// A closed surface as glass where nothing else is: the missing parts of a reconstruction.
     Ghost(&'a TriMesh),
     /// A surface coloured by a value at each vertex.
     Values {
@@ -188,18 +188,18 @@ impl Layer<'_> {
                 (surface_facets(mesh, |_, _| 0.5), look)
             }
             Self::Glass(mesh) | Self::Ghost(mesh) => {
-                // Rims are more opaque: what varies along a facet is how much it faces the eye.
+                // Rims are more opaque: the values of a facet are how much it faces the eye.
                 let facing = |_, normal| canvas.frame.back.dot(normal).abs() as f32;
                 let kind = if matches!(self, Self::Ghost(_)) { Kind::Ghost } else { Kind::Glass };
                 let paint = Paint::plain([0.0; 3]);
                 (surface_facets(mesh, facing), Look { paint, ink: GLASS_INK, kind })
             }
             Self::Values { mesh, values, scale } => {
-                let (vertices, given) = (mesh.vertices.len(), values.len());
-                if vertices != given {
-                    return Err(RenderError::Values { values: given, vertices });
+                let (vertices, found) = (mesh.vertices.len(), values.len());
+                if vertices != found {
+                    return Err(RenderError::Values { values: found, vertices });
                 }
-                // No lines: ink would be taken for a value.
+                // No lines: ink would look like a value.
                 let look = Look { paint: Paint::map(scale.map), ink: 0.0, kind: Kind::Solid };
                 (surface_facets(mesh, |v, _| scale.place(values[v as usize])), look)
             }
@@ -384,7 +384,7 @@ fn smooth_normals(mesh: &TriMesh, flat: &[Vec3]) -> Vec<[Vec3; 3]> {
                 let (u, v) = (b - a, c - a);
                 let lengths = u.length() * v.length();
                 let sine = u.cross(v).length() / lengths;
-                // Zero lengths: a face without area has no say.
+                // Zero lengths: a face without area has no weight.
                 if sine.is_finite() { sine / lengths * flat[face] } else { Vec3::ZERO }
             })
             .sum();

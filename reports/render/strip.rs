@@ -1,4 +1,4 @@
-//! The strip: several medial meshes of one shape beside each other, from one camera and with one scale.
+//! The strip: several medial meshes of one shape side by side, from one camera and with one scale.
 
 use medial::complex::MedialMesh;
 use medial::surface::TriMesh;
@@ -9,7 +9,7 @@ use super::picture::{Background, Bar, LINE, Picture, fitted, letter_size, text_w
 use super::scene::{Layer, Scale, Scene};
 use crate::text::round_up;
 
-/// What medial meshes are coloured by, before the scale is known.
+/// The colouring of medial meshes, before the scale is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ColourBy {
     /// The radii of the spheres.
@@ -36,7 +36,7 @@ pub struct Errors<'a> {
     pub mesh: &'a TriMesh,
     /// For each vertex its distance, positive outside, in the unit of the mesh.
     pub values: &'a [f64],
-    /// What stands below it.
+    /// The caption.
     pub caption: String,
 }
 
@@ -83,16 +83,16 @@ impl Errors<'_> {
 pub struct Panel<'a> {
     /// The medial mesh.
     pub axis: &'a MedialMesh,
-    /// What stands below it.
+    /// The caption.
     pub caption: String,
     /// Its reconstruction, for the second row.
     pub errors: Option<Errors<'a>>,
 }
 
-/// What the panels of a strip have in common.
+/// Shared settings of the panels of a strip.
 #[derive(Clone, Debug)]
 pub struct Strip<'a> {
-    /// The surface that the medial meshes are of: drawn as glass around them, and what the camera is set up by.
+    /// The surface that the medial meshes are of: drawn as glass around them; it sets up the camera.
     pub surface: &'a TriMesh,
     /// Bounding-box diagonal of the surface, of which bars show percentages.
     pub diagonal: f64,
@@ -100,9 +100,9 @@ pub struct Strip<'a> {
     pub camera: Camera,
     /// Width and height of a panel, without its caption.
     pub size: [usize; 2],
-    /// Panels beside each other, before the next ones begin a line of their own below them.
+    /// Panels in a line.
     pub across: usize,
-    /// What is behind everything.
+    /// The background.
     pub background: Background,
     /// The colours of the medial meshes.
     pub colour: ColourBy,
@@ -114,7 +114,7 @@ pub struct Strip<'a> {
 const MOST_PIXELS_OF_ALL: usize = 1 << 27;
 
 /// Medial meshes next to each other: one panel each, its caption below. If any panel has errors, a second row shows the
-/// reconstructions coloured by error, with what they lack as glass. Colours are on one scale along a row, which a bar at
+/// reconstructions coloured by error, with missing parts as glass. Colours are on one scale along a row, which a bar at
 /// its end shows.
 ///
 /// # Errors

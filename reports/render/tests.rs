@@ -63,7 +63,7 @@ fn a_sphere_is_a_disc() {
     assert_eq!(picture.pixel(120, 100).map(|pixel| pixel[3]), Some(255));
 }
 
-/// What faces the eye is lit by the lamp at the viewer's shoulder alone.
+/// Facets that face the eye are lit only by the lamp at the viewer's shoulder.
 #[test]
 fn the_middle_of_a_sphere_has_the_light_of_the_lamp() {
     let mesh = sphere(1.0, 48);
@@ -82,7 +82,7 @@ fn the_middle_of_a_sphere_has_the_light_of_the_lamp() {
 }
 
 #[test]
-fn what_is_nearer_hides_what_is_behind() {
+fn nearer_facets_hide_farther_ones() {
     let (near, far) = (square(1.0, 0.5), square(2.0, -0.5));
     let values = vec![0.0; 4];
     let at = |lo: f64| Scale { lo, hi: lo + 1.0, map: ColourMap::Diverging };
@@ -151,9 +151,9 @@ fn every_srgb_code_survives_decoding() {
     }
 }
 
-/// A ghost adds nothing to what is there, and shows where nothing is.
+/// A ghost does not cover other layers, and shows only where they are absent.
 #[test]
-fn a_ghost_is_what_is_missing() {
+fn a_ghost_shows_missing_parts() {
     let (whole, part) = (square(1.0, 0.5), square(0.5, 0.0));
     let [with, without] = [true, false].map(|ghost| {
         let mut layers = vec![Layer::Surface(&part)];
@@ -200,7 +200,7 @@ fn a_strip_has_a_panel_for_each_and_a_bar() {
     let two = strip(&[panel(Some(errors)), panel(None)], &common).expect("a strip");
     assert_eq!(one.width(), 2 * 160 + Bar::column(common.size));
     assert_eq!((two.width(), two.height()), (one.width(), 2 * one.height()));
-    // A third one begins a line of its own.
+    // A third one begins the next line.
     let three = strip(&[panel(None), panel(None), panel(None)], &common).expect("a strip");
     assert_eq!((three.width(), three.height()), (one.width(), 2 * one.height()));
     // Alike but for the place: panels of one mesh are one picture.
@@ -226,7 +226,7 @@ fn the_scale_of_errors_shows_the_better_half() {
 }
 
 #[test]
-fn what_makes_no_picture_is_said() {
+fn invalid_scenes_are_rejected() {
     let mesh = sphere(1.0, 4);
     let frame = Frame::fit(&front(), &mesh.vertices).expect("a frame");
     let scene = |layers, size| Scene { layers, size, background: Background::WHITE };

@@ -2,7 +2,7 @@
 //!
 //! Column names are the JSON keys, joined by `_` where an object lies inside another; the names of
 //! the parts that every record has are left out. Lengths are fractions of the bounding-box diagonal.
-//! An empty field stands for a number that was not measured.
+//! An empty field means not measured.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -86,7 +86,7 @@ fn descend(path: String, value: Value, values: &mut Vec<(String, Value)>) {
     }
 }
 
-/// A CSV with a header line. The command that made each row stands in the row.
+/// A CSV with a header line. Each row has the command that made it.
 pub(crate) fn to_csv(comparison: &Comparison<'_>) -> Result<Vec<u8>, csv::Error> {
     let rows: Vec<BTreeMap<String, String>> = comparison.entries.iter().map(row).collect();
     let evaluated = METRICS.iter().filter(|metric| matches!(metric.value, Place::Evaluation(_)));
@@ -111,7 +111,7 @@ pub(crate) fn to_csv(comparison: &Comparison<'_>) -> Result<Vec<u8>, csv::Error>
 fn row(entry: &Entry<'_>) -> BTreeMap<String, String> {
     let record = entry.record;
     let simplify = &record.simplify;
-    let (level, asked) = match simplify.level {
+    let (level, requested) = match simplify.level {
         Target::Published => ("published", String::new()),
         Target::Spheres(count) => ("spheres", count.to_string()),
         Target::Native(value) => ("native", value.to_string()),
@@ -119,7 +119,7 @@ fn row(entry: &Entry<'_>) -> BTreeMap<String, String> {
     };
     let mut row: BTreeMap<String, String> = [
         ("level", level.to_owned()),
-        ("asked", asked),
+        ("asked", requested),
         ("comparable", entry.comparable().to_string()),
         ("params", json!(simplify.params).to_string()),
         ("diagnostics", json!(simplify.diagnostics).to_string()),
@@ -179,7 +179,7 @@ fn add(name: String, value: &Value, row: &mut BTreeMap<String, String>) {
     row.insert(name, inert(text));
 }
 
-/// Text that a spreadsheet shows and does not run: a quote goes before what would begin a formula.
+/// Text that a spreadsheet shows and does not run: a quote goes before the first character of a formula.
 /// Numbers may begin so and stay as they are.
 fn inert(cell: String) -> String {
     let formula = cell.starts_with(['=', '+', '-', '@', '\t', '\r']);

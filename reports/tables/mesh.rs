@@ -39,7 +39,7 @@ impl Best {
 }
 
 /// Whether the Betti numbers are the solid's: `yes`, `no`, or a dash where one is unknown.
-pub(crate) fn topology_verdict(entry: &Entry<'_>) -> &'static str {
+pub(crate) fn topology_word(entry: &Entry<'_>) -> &'static str {
     let evaluation = entry.record.evaluate.as_ref();
     match evaluation.and_then(|e| Some((e.betti, e.expected_betti?))) {
         Some((found, expected)) if found == expected => "yes",
@@ -48,7 +48,7 @@ pub(crate) fn topology_verdict(entry: &Entry<'_>) -> &'static str {
     }
 }
 
-/// Why there is no result, or what is to be known of it: the last column.
+/// The reason for a missing result, or a remark: the last column.
 pub(crate) fn remark(entry: &Entry<'_>) -> String {
     let record = entry.record;
     if !record.status.is_ok() {
@@ -66,7 +66,7 @@ pub(crate) fn remark(entry: &Entry<'_>) -> String {
     String::new()
 }
 
-/// The table of one mesh. `how` tells the command line and version that made it.
+/// The table of one mesh. `how` has the command line and version that made it.
 pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) -> Table {
     let best = Best::of_mesh(comparison, mesh);
     let entries: Vec<Entry<'_>> = comparison.of_mesh(mesh).copied().collect();
@@ -94,12 +94,12 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
         let evaluation = entry.record.evaluate.as_ref();
         Cell::optional(evaluation.map(|evaluation| betti(Some(evaluation.betti))))
     });
-    rows = rows.text("as solid", topology_verdict);
+    rows = rows.text("as solid", topology_word);
     rows = rows.text("remark", remark);
     let mut notes = vec![how.to_owned()];
     if let Some(initial) = entries.iter().find_map(|entry| entry.record.initial) {
         notes.push(format!(
-            "Initial medial mesh: {} spheres, {} edges, {} faces; Betti numbers {}; the solid's: {}.",
+            "Initial medial mesh: {} spheres, {} edges, {} faces; Betti numbers {}; of the solid: {}.",
             grouped(initial.spheres),
             grouped(initial.edges),
             grouped(initial.faces),
@@ -121,5 +121,5 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
 
 /// Units and the meaning of bold, under every table of one mesh.
 const UNITS: &str = "Lengths in % of the bounding-box diagonal of the input; seconds of wall clock, \
-    shared substrates included. Arrows: which way is better. Bold: best at this number of spheres, \
+    shared substrates included. Arrows point in the better direction. Bold: best at this number of spheres, \
     among results that reached it to within 2 %.";

@@ -10,7 +10,7 @@ use serde::{Serialize, Serializer};
 use crate::text::{escape_html, printable};
 
 pub(crate) use self::csv::{flatten, to_csv, warnings};
-pub(crate) use self::mesh::{Best, mesh_table, remark, topology_verdict};
+pub(crate) use self::mesh::{Best, mesh_table, remark, topology_word};
 
 /// A table before it takes a format.
 #[derive(Clone, Default, Serialize)]
@@ -53,14 +53,14 @@ impl Table {
         self.notes.truncate(1); // the command
         for (k, column) in self.columns.iter().enumerate() {
             if column.title.starts_with("topology") {
-                let verdicts = [("1 of 1", "yes"), ("0 of 1", "no")];
+                let words = [("1 of 1", "yes"), ("0 of 1", "no")];
                 for cell in self.rows.iter_mut().map(|row| &mut row[k]) {
-                    let verdict = verdicts.iter().find(|(share, _)| *share == cell.text);
-                    *cell = verdict.map_or(cell.clone(), |(_, verdict)| (*verdict).into());
+                    let word = words.iter().find(|(share, _)| *share == cell.text);
+                    *cell = word.map_or(cell.clone(), |(_, word)| (*word).into());
                 }
             }
         }
-        self.without(&["means over", "meshes", "kept on", "on", "failed"])
+        self.without(&["means over", "meshes", "valid on", "on", "failed"])
     }
 
     /// The table without some columns, by their titles.
@@ -132,7 +132,7 @@ impl Column {
     }
 }
 
-/// What stands where there is nothing.
+/// The mark of an empty cell.
 const UNKNOWN: &str = "–";
 
 /// One cell.
@@ -216,7 +216,7 @@ fn markdown_line(cells: impl Iterator<Item = String>) -> String {
     format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
 }
 
-/// Escapes what Markdown or the HTML inside it would take for markup.
+/// Escapes the markup of Markdown and of the HTML inside it.
 pub(crate) fn escape(text: &str) -> String {
     let text = printable(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let is_markup = |c| "|\\`*_[]#~$".contains(c);

@@ -2,12 +2,12 @@
 # Every metric against an independent second opinion, in one table: sets up what it needs (Open3D and GUDHI
 # from PyPI in a virtual environment below the build folder; CGAL from Debian: libcgal-dev, libgmp-dev,
 # libmpfr-dev, g++), runs all comparisons, and writes the table to oracles.json (and, with DIR, into that
-# report) and oracles.md in the build folder's `oracles`. What is missing is counted as skipped. Exit
+# report) and oracles.md in the build folder's `oracles`. Missing programs count as skipped. Exit
 # codes: 0 all that ran agree, 1 some differ.
 #
 #   scripts/oracles/all.sh [-m MESHES] [DIR]
 #
-# MESHES: a folder with meshes beside the built-in shapes [default: $MEDIAL_MESHES, if set]. Programs that are
+# MESHES: a folder with meshes besides the built-in shapes [default: $MEDIAL_MESHES, if set]. Programs that are
 # there already can be named: MEDIAL, DISTANCE_ORACLE (src/bin/distance_oracle.rs), ORACLE_PYTHON.
 set -eu
 cd "$(dirname "$0")/../.."

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Checks certified intervals: each mesh, simplified by Q-MAT to each number of spheres, certified and sampled by
 # the same program run; the default makes about ten million samples both ways together. To the samples comes
-# the certificate's own witness, measured anew by witness.py: it must be on its surface, at the distance of the
+# the certificate's own witness, measured again by witness.py: it must be on its surface, at the distance of the
 # interval's lower end. The largest of all these must lie in the interval; `missed` is what the samples alone
 # fall short of its lower end. Prints one row for each case. Exit codes: 0 every interval holds its
 # estimate, 1 one does not, 77 there is no mesh.

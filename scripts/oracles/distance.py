@@ -5,7 +5,7 @@
 FILE and ANSWERS (of mode `closest`) as in src/bin/distance_oracle.rs. Prints a row of the table of
 oracles: the largest difference as a fraction of the diagonal, and of the distances in double precision
 from the query to Open3D's own closest point. The mesh and the queries are moved to the origin first, so
-that single precision is spent on the mesh and not on where it stands.
+that single precision is spent on the mesh and not on its position.
 """
 
 import json

@@ -2,9 +2,9 @@
 
     flux.py FILE ANSWERS THREADS ROUNDS [GUARD]
 
-FILE, FILE.voxels and ANSWERS as in src/bin/flux_oracle.rs. All samples are asked in one
+FILE, FILE.voxels and ANSWERS as in src/bin/flux_oracle.rs. All samples are queried in one
 batched call of RaycastingScene (single precision), the opposites of fan samples in a second one. Fans
-are told from the primitive's barycentric coordinates. A voxel with a sample that single precision
+are recognised by the primitive's barycentric coordinates. A voxel with a sample that single precision
 cannot decide (GUARD, a fraction of the diagonal; a closest point elsewhere at an equal distance, or one
 next to the border of a fan, or of an opposite) is a tie: it is counted and left out. Prints seconds a batch of the first
 call, its number of queries, ties, and the largest difference; fails where it exceeds 1e-4.
@@ -104,7 +104,7 @@ on_fan = is_on_fan(near, face)
 doubtful = np.linalg.norm(near - ours[:, :3], axis=1) > guard
 # A step aside, and the closest point is elsewhere, or on another kind of feature: a tie, or the border
 # of a fan. At a distance D from an edge, points up to
-# sqrt(2^-23) D beside it are as near as the edge itself, to single precision.
+# sqrt(2^-23) D next to it are as near as the edge itself, to single precision.
 steps = 50 * guard * np.vstack((np.eye(3), -np.eye(3)))
 for step in steps:
     moved, moved_face, _ = ask(samples + step)
@@ -119,7 +119,7 @@ if len(inward):
     opposite = samples[inward] - 2 * sigma * along[inward, None] * gradient[inward]
     other, _, _ = ask(opposite)
     # The same edge means the same foot of the perpendicular: see methods/aof/flux.rs. An opposite
-    # a step beside which that is otherwise has more than one closest point, to single precision.
+    # for which a step leads elsewhere has more than one closest point, to single precision.
     def is_other(step):
         other, other_face, _ = ask(opposite + step)
         moved = np.linalg.norm(other - near[inward], axis=1) > guard + 1.2 * np.linalg.norm(step)

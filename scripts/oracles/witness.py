@@ -1,8 +1,8 @@
-"""Measures a certificate's witness anew, without any of the program's code.
+"""Measures a certificate's witness again, without any of the program's code.
 
     witness.py MESH AXIS.ma EVALUATION.json
 
-Prints two fractions of the diagonal: how far the witness is off the surface that it is said to be on, and its
+Prints two fractions of the diagonal: how far the witness is off the surface that it should be on, and its
 distance from the other one. Distances to cones and slabs are minima over their balls, which are convex: found
 by golden sections. Plain Python: no package is needed.
 """

@@ -10,7 +10,7 @@
 //! 3. Edges shorter than a quarter of the tetrahedron's edge are contracted: a closed manifold stays one,
 //!    and vertices stay on the boundary ([`contract_short_edges`]).
 //!
-//! # What the tolerance means
+//! # The tolerance
 //!
 //! Every point with `sigma > tolerance` is outside the surface, and every point with
 //! `sigma < -tolerance` is inside. Proof: let `d` be the longest edge of the tetrahedron that holds the
@@ -43,7 +43,7 @@ pub struct UnionSurface {
     pub mesh: TriMesh,
     /// Tetrahedra that were needed.
     pub tetrahedra: usize,
-    /// Spheres with a radius below the smallest tetrahedron: these, and what tapers to them, may be
+    /// Spheres with a radius below the smallest tetrahedron: these, and parts that taper to them, may be
     /// missing.
     pub lost: usize,
     /// Radius below which a sphere counts as lost, in the unit of the mesh.
@@ -57,12 +57,11 @@ pub enum ContourError {
     #[error(transparent)]
     Union(#[from] UnionError),
     /// The tolerance is not a positive number.
-    #[error("a tolerance of {0} is not positive")]
+    #[error("tolerance {0}: not positive")]
     Tolerance(f64),
     /// The tolerance is too fine for the memory that this may take.
     #[error(
-        "a tolerance of {tolerance:e} needs more than {most} tetrahedra, or finer ones than there are; \
-         {feasible:e} is feasible"
+        "tolerance {tolerance:e}: needs more than {most} tetrahedra, or too fine ones; {feasible:e} is feasible"
     )]
     TooFine {
         /// The requested tolerance, in the unit of the mesh.
@@ -73,9 +72,7 @@ pub enum ContourError {
         feasible: f64,
     },
     /// No part of the union is thick enough.
-    #[error(
-        "no part of the union is as thick as {smallest:e}: a tolerance below {feasible:e} shows some"
-    )]
+    #[error("no part of the union is as thick as {smallest:e}; use a tolerance below {feasible:e}")]
     TooThin {
         /// The smallest tetrahedron.
         smallest: f64,
@@ -104,7 +101,7 @@ const MIN_SHARE_OF_CELL: f64 = 1.0 / 16.0;
 const MAX_TETRAHEDRA: usize = 50_000_000;
 
 /// The boundary of the union of all primitives of a medial mesh as triangles. `tolerance` is in the unit of
-/// the mesh; the head of this file says what it means.
+/// the mesh; the head of this file defines it.
 ///
 /// The time and memory grow with the area of the boundary over the square of the tolerance. Parallel;
 /// the same surface for any number of threads.
@@ -473,8 +470,8 @@ impl Bisection {
     }
 
     /// Bisects until no tetrahedron is wanted and all are conforming. `values` gives the values at
-    /// new vertices, `goal` is the generation that is wanted everywhere at the boundary. `go_on` is asked
-    /// in every round, and every so many vertices.
+    /// new vertices, `goal` is the generation that is wanted everywhere at the boundary. `go_on` is called
+    /// in every round, for every [`CHUNK`] of vertices.
     ///
     /// # Errors
     /// When there are more than `most` tetrahedra, or will be by far: near a surface, three bisections

@@ -118,7 +118,7 @@ impl MedialMesh {
         simplex.map(|v| self.spheres[v as usize])
     }
 
-    /// Edges without a face, in their order: where a face stands for its sides, too.
+    /// Edges without a face, in their order: for formats whose faces imply their sides.
     pub(crate) fn lone_edges(&self) -> Vec<[u32; 2]> {
         let incidence = Incidence::of(self);
         let lone = self.edges.iter().zip(incidence.faces_at()).filter(|&(_, &faces)| faces == 0);

@@ -8,7 +8,7 @@
 //! a twist", EuroCG 2011.
 //!
 //! 1. `rank d1` is the number of edges of a spanning forest: disjoint sets.
-//! 2. *Elementary collapses*: a face with an edge of its own is in no 2-cycle. Removing both
+//! 2. *Elementary collapses*: a face with an edge that no other face has is in no 2-cycle. Removing both
 //!    leaves `ker d2` as it is; repeat until no edge has exactly one face.
 //! 3. *Sheets*: of an edge with exactly two faces, a 2-cycle contains both or neither. So it contains
 //!    all faces joined by such edges (a sheet) or none of them. The other edges, with three faces or

@@ -1,6 +1,6 @@
 //! Disjoint sets of consecutive ids.
 //!
-//! By hand because the representative is the smallest member, whatever the order of the joins; that of
+//! By hand because the representative is the smallest member, for any order of the joins; that of
 //! `petgraph` depends on ranks.
 
 /// A partition of `0..n` whose sets can be joined. The representative of a set is its smallest member.

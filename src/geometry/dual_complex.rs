@@ -636,7 +636,7 @@ pub enum DualViolation {
     /// A simplex is in the complex and one of its faces is not.
     #[error("{simplex:?} is in the complex but its face {face:?} is not")]
     Open { simplex: Vec<VertexId>, face: Vec<VertexId> },
-    /// The class of a simplex is not what its cofaces say.
+    /// The class of a simplex contradicts its cofaces.
     #[error("{simplex:?} is recorded as {found:?}, its cofaces make it {expected:?}")]
     Class { simplex: Vec<VertexId>, found: Option<Class>, expected: Option<Class> },
     /// An anchor, or a point that is no vertex, is in the complex.
@@ -654,7 +654,7 @@ fn follows(all_cells: bool, any_coface: bool, singular: Option<Class>) -> Option
 }
 
 impl DualComplex<'_> {
-    /// Checks that the complex is closed under faces, and that each class is what the cofaces say.
+    /// Checks that the complex is closed under faces, and that each class agrees with the cofaces.
     ///
     /// # Errors
     /// The first violation found.

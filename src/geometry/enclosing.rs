@@ -187,7 +187,7 @@ mod tests {
             prop_assert!(radius >= iterated * 0.999 - 1e-12, "{radius} under {iterated}");
         }
 
-        /// What the filter by enclosing balls rests on: on the Voronoi facet, edge and vertex dual
+        /// The basis of the filter by enclosing balls: on the Voronoi facet, edge and vertex dual
         /// to an edge, a triangle and a tetrahedron the radius grows, up to that of the circumball,
         /// which it reaches just where the circumcentre lies within.
         #[test]

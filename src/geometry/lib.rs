@@ -6,7 +6,7 @@
 //! | [`DualComplex`], [`UnionBoundary`] | the alpha complex of balls, and the vertices of their union's boundary |
 //! | [`Poles`], [`PowerCrust`] | polar balls of a sample, and the surface between inner and outer balls |
 //! | [`Sphere`], [`Cone`], [`Slab`] | signed distances to a ball and to the hulls of two and of three |
-//! | [`TriangleTree`] | the triangles that cross another one, beyond what they share |
+//! | [`TriangleTree`] | the triangles that cross another one, beyond common vertices and edges |
 //! | [`trees::PointTree`] | the nearest point, and the points within a distance |
 //! | [`trees`] | box trees for your own searches: best first, overlapping, four boxes at a time |
 //! | [`predicates`] | signs that no rounding can turn |

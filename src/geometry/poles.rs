@@ -218,7 +218,7 @@ fn polar_balls(
 // triangulation is dual to an edge of the power diagram, and zero or two facets of the crust meet
 // there. At each cell, which has four vertices, the facets of the crust form one cycle of three or
 // four. Ties are broken by the triangulation's symbolic perturbation, which leaves exactly four balls
-// at each corner. So the crust is a closed manifold for any balls, whatever their labels.
+// at each corner. So the crust is a closed manifold for any balls with any labels.
 //
 // Without the perturbation many balls meet in one point: all polar balls of a sample do. There the
 // crust has several corners at one position, up to rounding, with edges of zero length between them.

@@ -1,4 +1,4 @@
-//! The sphere, its signed distance, and the answer type shared by sphere, cone and slab.
+//! The sphere, its signed distance, and the result type shared by sphere, cone and slab.
 
 use crate::Vec3;
 use crate::planar_frame::PlanarFrame;
@@ -46,7 +46,7 @@ pub struct HullFoot<const N: usize> {
     pub signed_distance: f64,
     /// The interpolated sphere `sum_i weights[i] m_i` that attains the distance.
     pub sphere: Sphere,
-    /// Barycentric weights of that sphere over the given ones: non-negative, of sum 1.
+    /// Barycentric weights of that sphere over the input spheres: non-negative, of sum 1.
     pub weights: [f64; N],
     /// The nearest point, on `sphere` and on the boundary of the hull.
     pub point: Vec3,
@@ -67,8 +67,8 @@ impl<const N: usize> HullFoot<N> {
     ) -> Self {
         let arm = p - sphere.centre;
         let distance = arm.length();
-        let tells = distance > 0.0 && distance > SHORT_ARM * sphere.radius;
-        Self::along(sphere, weights, p, if tells { arm / distance } else { apart() })
+        let is_long = distance > 0.0 && distance > SHORT_ARM * sphere.radius;
+        Self::along(sphere, weights, p, if is_long { arm / distance } else { apart() })
     }
 
     /// The foot of `p` in a known direction from the centre.
@@ -236,7 +236,7 @@ impl Cone {
 // 1. In the frame of the centres' plane ([`PlanarFrame`]) the query is `(x, y, h)`, and the
 //    radius is linear with gradient `g`.
 // 2. The best centre is `(x, y) + |h| / k g` with `k = sqrt(1 - g.g)`.
-// 3. Inside the triangle, the distance to its sphere is the answer; else the least of the cones.
+// 3. Inside the triangle, the distance to its sphere is the result; else the least of the cones.
 //
 // With collinear centres, or `g.g >= 1` (no plane touches all three balls from outside), the hull
 // is the union of the three cones, exactly.
@@ -252,7 +252,7 @@ const MIN_RELATIVE_HEIGHT: f64 = 1e-10;
 /// ```
 /// use medial_geometry::{Slab, Sphere, Vec3};
 ///
-/// // A triangular plate, 2 thick, with round edges, and queries above it and beside it.
+/// // A triangular plate, 2 thick, with round edges, and queries above it and next to it.
 /// let corners = [Vec3::ZERO, 8.0 * Vec3::X, Vec3::new(4.0, 4.0, 0.0)];
 /// let plate = Slab::new(corners.map(|c| Sphere::new(c, 1.0)));
 /// let above = Vec3::new(4.0, 2.0, 3.0);

@@ -31,7 +31,7 @@ pub struct TriangleTree {
 
 impl TriangleTree {
     /// A tree of the triangles `ids`, whose corners are `corners(id)`. Triangles without area are left out:
-    /// what they meet is not defined by planes. Cost `O(n log n)`.
+    /// their intersections are not defined by planes. Cost `O(n log n)`.
     pub fn new(ids: impl IntoIterator<Item = u32>, corners: impl Fn(u32) -> [Vec3; 3]) -> Self {
         let ids = ids.into_iter().filter(|&id| projection_axis(corners(id)).is_some());
         let given: Vec<u32> = ids.collect();

@@ -1,7 +1,7 @@
 //! Local ascent from the largest samples of a distance, so that a maximum does not depend on how
 //! close to it a sample happens to be.
 //!
-//! A sampled maximum is too small by what the nearest sample misses: nothing if the maximum is at a
+//! A sampled maximum is too small by the error at the nearest sample: nothing if the maximum is at a
 //! vertex, which is sampled, but much if it is at the tip of a ball or in a notch between two cones.
 //! That would favour some methods over others. Therefore, from the samples:
 //!
@@ -228,7 +228,7 @@ pub struct Peaks {
 impl Peaks {
     /// The largest distance of both directions: a lower bound of the Hausdorff distance.
     pub fn hausdorff(&self) -> f64 {
-        // The largest stands first in each list.
+        // The largest is the first in each list.
         let firsts = [&self.forward, &self.reverse].into_iter().filter_map(|peaks| peaks.first());
         firsts.fold(0.0, |largest, peak| largest.max(peak.distance))
     }
@@ -245,7 +245,7 @@ impl<'a> PeakSearch<'a> {
     /// A search over `surface`, whose faces are in `tree`.
     ///
     /// # Errors
-    /// When the surface has no area, or no samples are asked.
+    /// When the surface has no area, or no samples are requested.
     pub fn new(
         surface: &TriMesh,
         tree: &'a TriangleBvh,
@@ -261,7 +261,7 @@ impl<'a> PeakSearch<'a> {
     /// can be a little larger.
     ///
     /// # Errors
-    /// When the medial mesh is empty or not valid, or no samples are asked.
+    /// When the medial mesh is empty or not valid, or no samples are requested.
     pub fn of(&self, mesh: &MedialMesh) -> Result<Peaks, MetricError> {
         let Self { tree, samples, options } = self;
         let (mesh, union) = samples.ordered(mesh)?;
@@ -355,7 +355,7 @@ mod tests {
         let ball = |x: f64| Sphere::new(Vec3::new(0.5 + x, 0.5, -1.0), 0.5);
         let union = MedialUnion::of_spheres(&[ball(-0.3), ball(0.3)]).unwrap();
         let hill = OnUnion { union: &union, surface: &tree, burial: 1e-12 };
-        // Beside the pole that is farthest from the square.
+        // Next to the pole that is farthest from the square.
         let found = best(&hill, &surface, &[Vec3::new(0.15, 0.55, -1.49)], 0.1);
         assert!((found.distance - 1.5).abs() < 1e-6, "{found:?}");
         assert!(union.signed(found.point).abs() < 1e-12);

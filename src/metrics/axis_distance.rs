@@ -8,7 +8,7 @@
 //!   everywhere are `d` apart.
 //! - Maxima are over samples of all triangles and lone edges, and all spheres.
 //! - Means are over the parts of the highest dimension that the sampled axis has: by area if it has
-//!   triangles, else by length, else over its points. A curve has no area, so it has no weight beside
+//!   triangles, else by length, else over its points. A curve has no area, so it has no weight next to
 //!   a sheet.
 //! - A *sheet* of the true axis is a set of triangles connected across edges of exactly two
 //!   triangles. A point of a sheet is covered if the computed axis is within [`COVERED`] of it in
@@ -48,7 +48,7 @@ impl Default for AxisOptions {
 /// Distances between a computed medial axis and the true one, in their unit.
 ///
 /// # Errors
-/// When an axis is empty or not valid, or no samples are asked.
+/// When an axis is empty or not valid, or no samples are requested.
 pub fn axis_distance(
     computed: &MedialMesh,
     truth: &MedialMesh,
@@ -405,7 +405,7 @@ mod tests {
         const STEPS: u32 = 100;
         for _ in 0..40 {
             let p = 1.5 * random();
-            let told = axis.distances(&[p])[0];
+            let found = axis.distances(&[p])[0];
             let mut dense = f64::INFINITY;
             for [a, b, c] in &simplices {
                 for i in 0..=STEPS {
@@ -415,7 +415,7 @@ mod tests {
                     }
                 }
             }
-            assert!(told <= dense + 1e-12 && dense - told < 0.01, "{told} for {dense}");
+            assert!(found <= dense + 1e-12 && dense - found < 0.01, "{found} for {dense}");
         }
     }
 }

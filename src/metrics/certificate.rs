@@ -6,7 +6,7 @@
 //! - (a) the largest `|sigma(p)|` over the points `p` of S, and
 //! - (b) the largest distance to S over the points of the boundary of U.
 //!
-//! These are what [`Distances`](super::Distances) samples as `epsilon_union` and `reverse`. Outside
+//! [`Distances`](super::Distances) samples these as `epsilon_union` and `reverse`. Outside
 //! U, `sigma` is the distance to U; inside, `-sigma` is the depth in the deepest single
 //! primitive, which is less than the depth in U where primitives cover each other.
 //!
@@ -49,7 +49,7 @@ use crate::surface::{TriMesh, TriangleBvh};
 /// Bound on the rounding error of a distance, in units of the surface's diagonal.
 pub const ROUNDING: f64 = 1e-9;
 
-/// Finer intervals than this, in diagonals, are refused: rounding would be a part of them.
+/// Finer intervals than this, in diagonals, are rejected: rounding would be a part of them.
 pub const FINEST: f64 = 1e-6;
 
 /// Bounds on the pieces of a round for small inputs and for any: about 0.7 and 2 GB.
@@ -178,7 +178,7 @@ struct Search {
 
 impl Search {
     fn run<S: Side>(&mut self, side: &S, mut pieces: Vec<S::Piece>) -> Result<(), MetricError> {
-        // A few bytes of input must not take minutes before they are refused.
+        // A few bytes of input must not take minutes before they are rejected.
         let most = (MAX_GROWTH * pieces.len()).clamp(MAX_PIECES[0], MAX_PIECES[1]);
         while !pieces.is_empty() {
             self.pieces += pieces.len() as u64;

@@ -23,7 +23,7 @@
 //! - The order and the random turn of a patch depend on its spheres, rounded far more coarsely than any
 //!   error of theirs, and not on its place in a list from which another patch may vanish.
 //! - Patches get their number of samples from a running sum of areas. A patch that rounding adds or
-//!   removes has no area to speak of.
+//!   removes has almost no area.
 
 use std::f64::consts::{PI, TAU};
 
@@ -74,7 +74,7 @@ const PLASTIC: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 /// points come out for any number of threads.
 ///
 /// # Errors
-/// When no samples are asked for.
+/// When no samples are requested.
 pub fn sample_envelope(
     mesh: &MedialMesh,
     union: &MedialUnion,
@@ -103,22 +103,22 @@ pub(super) fn sample_envelope_in(
     }
     let patches = patches(mesh, pose);
     let total = patches.iter().map(|patch| patch.surface.area()).sum::<f64>();
-    let asked = options.samples as f64;
-    // Candidates per area of the densest run: if this overflows, the union has no area to speak of.
-    let densest = (asked * MAX_CANDIDATES).max(MIN_PILOT) / total;
+    let wanted = options.samples as f64;
+    // Candidates per area of the densest run: if this overflows, the union has almost no area.
+    let densest = (wanted * MAX_CANDIDATES).max(MIN_PILOT) / total;
     if !(total > 0.0 && total.is_finite() && densest.is_finite()) {
         let points: Vec<Vec3> = mesh.spheres.iter().map(|m| m.centre).collect();
         return Ok(Weighted { weights: vec![1.0; points.len()], points });
     }
     let sampled =
         |candidates| sample_patches(&patches, pose.axes(), candidates / total, union, options);
-    let pilot = (asked / PILOT).max(MIN_PILOT);
+    let pilot = (wanted / PILOT).max(MIN_PILOT);
     let share = sampled(pilot).total() / pilot;
-    let mut samples = sampled(asked * candidates_for(share));
-    let survivors = samples.total() / (asked * candidates_for(share));
-    if samples.total() < MIN_SHARE * asked && candidates_for(survivors) > candidates_for(share) {
+    let mut samples = sampled(wanted * candidates_for(share));
+    let survivors = samples.total() / (wanted * candidates_for(share));
+    if samples.total() < MIN_SHARE * wanted && candidates_for(survivors) > candidates_for(share) {
         // The pilot run had too few survivors to estimate their share.
-        samples = sampled(asked * candidates_for(survivors));
+        samples = sampled(wanted * candidates_for(survivors));
     }
     Ok(samples)
 }

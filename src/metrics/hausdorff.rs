@@ -59,34 +59,32 @@ pub enum MetricError {
     #[error(transparent)]
     Tree(BvhError),
     /// The surface has no area that could be sampled.
-    #[error("the surface has no area, or an area that is not finite: nothing can be sampled on it")]
+    #[error("the surface has no finite area to sample")]
     NoArea,
     /// The surface has no volume that could be compared with.
-    #[error("the surface encloses no volume (signed volume {0}): is it closed and oriented?")]
+    #[error("the surface encloses no volume (signed volume {0}); it must be closed and oriented")]
     NoVolume(f64),
-    /// Too few samples were asked for.
-    #[error("at least one sample is needed, {0} asks for none")]
+    /// No samples were requested.
+    #[error("{0}: too few samples (found 0, expected at least 1)")]
     NoSamples(&'static str),
     /// Balls on the primitives need a distance between them.
-    #[error("a spacing of {0} is not positive")]
+    #[error("spacing {0}: not positive")]
     Spacing(f64),
     /// The balls on the primitives would not fit into memory.
-    #[error("{count:.0} balls would be needed, at most {most} are taken: choose a wider spacing")]
+    #[error("{count:.0} balls: too many (expected at most {most}); choose a wider spacing")]
     TooManyBalls {
-        /// Balls at the spacing that was asked.
+        /// Balls at the requested spacing.
         count: f64,
         /// The limit.
         most: usize,
     },
     /// An interval that cannot be certified.
     #[error(
-        "a tolerance of {0} cannot be certified: ask for a fraction of the diagonal between 1e-6 and 1"
+        "tolerance {0}: cannot be certified (expected a fraction of the diagonal between 1e-6 and 1)"
     )]
     Tolerance(f64),
     /// The certificate would not fit into memory.
-    #[error(
-        "a tolerance of {tolerance:.1e} would need {pieces} pieces and more: ask for a larger one"
-    )]
+    #[error("tolerance {tolerance:.1e}: needs {pieces} pieces and more; choose a larger one")]
     TooFine {
         /// Width of the interval.
         tolerance: f64,
@@ -104,7 +102,7 @@ pub enum MetricError {
 /// The result is the same for any number of threads.
 ///
 /// # Errors
-/// When the medial mesh is empty or not valid, the surface has no area, or no samples are asked.
+/// When the medial mesh is empty or not valid, the surface has no area, or no samples are requested.
 ///
 /// # Panics
 /// If a face of `surface` names a vertex that does not exist.
@@ -147,7 +145,7 @@ pub(super) fn distances_with_envelope(
     let epsilon = highest(bvh, &by_mu, |p, near| union.unsigned_from(p, near));
     // |sigma| >= mu at every point, so the maximum found for mu bounds it, too.
     let epsilon_union = epsilon_union.max(epsilon);
-    // Fewer seeds: this is a figure beside the others, not one that results are compared by.
+    // Fewer seeds: this figure is additional, and results are not compared by it.
     let aside = Start { values: &spheres, seeds: SEEDS / 3, ..start };
     let spheres_only = highest(bvh, &aside, |p, near| balls.signed_from(p, near).abs());
     let envelope = EnvelopeOptions {

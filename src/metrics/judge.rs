@@ -18,7 +18,7 @@ use crate::complex::{Incidence, MedialMesh, MedialUnion, ZERO_LENGTH, betti, eul
 use crate::surface::{InsideTest, Side, TriMesh, TriangleBvh};
 
 /// Mean error from which radii that do not fit the surface cause a warning. A result with a smaller
-/// error is right, whatever its radii.
+/// error is right, for any radii.
 const LARGE_MEAN: f64 = 0.005;
 
 /// For centres closer to the surface than this the ratio of radius to distance means nothing.
@@ -27,7 +27,7 @@ const ON_SURFACE: f64 = 1e-6;
 /// How results are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JudgeOptions {
-    /// Area-uniform samples on the surface, beside its vertices, and about as many on the
+    /// Area-uniform samples on the surface, besides its vertices, and about as many on the
     /// boundary of the union.
     pub samples: usize,
     /// Levels of subdivision of space for the volume difference; 0 skips it.
@@ -42,7 +42,7 @@ impl Default for JudgeOptions {
     }
 }
 
-/// Known facts that every result should agree with, whatever its method.
+/// Known facts that every result should agree with, by any method.
 #[derive(Clone, Debug, Default)]
 pub struct Truth {
     /// Betti numbers that the medial axis must have by the solid's topology.
@@ -279,7 +279,7 @@ impl Judge {
 // The record of everything measured on one medial mesh: the `evaluate` object of the command.
 //
 // All lengths are fractions of the input's bounding-box diagonal. METHODOLOGY.md defines each
-// number; the modules beside this one compute them.
+// number; the modules next to this one compute them.
 
 /// Everything measured on one medial mesh against one surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

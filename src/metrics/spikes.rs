@@ -35,7 +35,7 @@ pub const RATIO_THRESHOLDS: [f64; 3] = [0.05, 0.1, 0.2];
 /// Largest protrusion of an idle sphere, as a fraction of the bounding-box diagonal.
 pub const IDLE_PROTRUSION: f64 = 1e-3;
 /// Radii that differ by less count as equal, as a fraction of the bounding-box diagonal. Otherwise
-/// rounding would decide about plates and tubes, whose radii are all the same.
+/// rounding would decide about plates and tubes, whose radii are equal.
 pub const EQUAL_RADII: f64 = 1e-9;
 /// Smallest angle of a fin, in degrees.
 pub const FIN_ANGLE: f64 = 10.0;
@@ -163,7 +163,7 @@ fn idle_spheres(mesh: &MedialMesh, boundary: &[bool]) -> u64 {
     for &[a, b] in &mesh.edges {
         for (v, u) in [(a, b), (b, a)] {
             let (ball, neighbour) = (mesh.spheres[v as usize], mesh.spheres[u as usize]);
-            if boundary[v as usize] && is_idle_beside(ball, neighbour) {
+            if boundary[v as usize] && is_idle_next_to(ball, neighbour) {
                 idle[v as usize] = true;
             }
         }
@@ -173,7 +173,7 @@ fn idle_spheres(mesh: &MedialMesh, boundary: &[bool]) -> u64 {
 
 /// Whether a ball protrudes by less than [`IDLE_PROTRUSION`] from another that is at least as large,
 /// up to [`EQUAL_RADII`].
-fn is_idle_beside(ball: Sphere, neighbour: Sphere) -> bool {
+fn is_idle_next_to(ball: Sphere, neighbour: Sphere) -> bool {
     let growth = neighbour.radius - ball.radius;
     growth > -EQUAL_RADII && ball.centre.distance(neighbour.centre) - growth < IDLE_PROTRUSION
 }
@@ -198,7 +198,7 @@ fn angle_spikes(mesh: &MedialMesh, contacts: &Contacts) -> u64 {
 // ascent reached from them. They are tested from the farthest from the surface on; the first one
 // outside the solid gives the protrusion.
 
-/// Points that are tested together. Usually the first batch has the answer.
+/// Points that are tested together. Usually the first batch decides.
 const BATCH: usize = 1024;
 
 /// Largest distance from the surface of a boundary point of the union that is outside the solid, 0

@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_measured_is_said() {
+    fn unmeasurable_unions_are_errors() {
         let mesh = chain(&[[0.0, 0.0], [1.0, 0.0]], 0.1);
         assert!(matches!(union_betti(&mesh, 0.0), Err(MetricError::Spacing(_))));
         assert!(matches!(union_betti(&mesh, 1e-9), Err(MetricError::TooManyBalls { .. })));

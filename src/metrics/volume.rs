@@ -61,7 +61,7 @@ pub fn enclosed_volume(surface: &TriMesh) -> f64 {
 
 /// Volume of the symmetric difference of the solid and the union, over the solid's volume.
 ///
-/// `inside` tells whether a point lies in the solid that `surface` bounds, whose faces are in
+/// `inside` tests whether a point lies in the solid that `surface` bounds, whose faces are in
 /// `bvh`. The same number comes out for any number of threads.
 ///
 /// # Errors

@@ -43,18 +43,18 @@ pub struct MethodInfo {
     /// Whether there is one result for each shape, at [`Level::Published`](crate::simplifier::Level::Published)
     /// alone.
     pub fixed: bool,
-    /// What [`Level::Published`](crate::simplifier::Level::Published) means here.
+    /// Meaning of [`Level::Published`](crate::simplifier::Level::Published) here.
     pub published: Text,
     /// Parameters, in the order of the paper.
     pub params: Vec<ParamInfo>,
-    /// What the results carry in [`Extras`](crate::simplifier::Extras).
+    /// The contents of the results' [`Extras`](crate::simplifier::Extras).
     pub extras: Vec<Capability>,
 }
 
 impl MethodInfo {
     /// A method of spheres alone: no native level, no published one, no parameters.
     pub fn new(id: impl Into<Text>, title: impl Into<Text>) -> Self {
-        let published = "unsupported: ask for a number of spheres".into();
+        let published = "unsupported: request a number of spheres".into();
         Self { id: id.into(), title: title.into(), published, ..Self::default() }
     }
 
@@ -189,8 +189,7 @@ pub struct Registered {
     pub method: Box<dyn MedialSimplifier>,
     /// Its place in a comparison.
     pub presentation: Presentation,
-    /// A text that changes with the sources of the method; `None` where the program's file stands for
-    /// them.
+    /// A text that changes with the sources of the method; `None` where the program's file serves instead.
     pub version: Option<Text>,
 }
 
@@ -246,7 +245,7 @@ impl Registered {
 /// Parameters as given by the user, not yet typed: a JSON object.
 ///
 /// Each method turns them into its own struct (`Default` = the paper's values, unknown keys
-/// refused) by [`Params::typed`]; this is the one place where the type is erased.
+/// rejected) by [`Params::typed`]; this is the one place where the type is erased.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Params(pub serde_json::Map<String, serde_json::Value>);
@@ -274,7 +273,7 @@ impl Params {
                 .map_err(|error| error.to_string())
         };
         parse(&self.0).map_err(|message| {
-            // Serde does not say which key a wrong value belongs to: the one that fails alone too.
+            // Serde does not report the key of a wrong value: the one that fails alone too.
             let wrong = self.0.iter().find(|&(key, value)| {
                 let alone = serde_json::Map::from_iter([(key.clone(), value.clone())]);
                 parse(&alone).is_err_and(|error| error == message)
@@ -285,7 +284,7 @@ impl Params {
     }
 }
 
-/// The parameters of a method that has none: every key is refused.
+/// The parameters of a method that has none: every key is rejected.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoParams {}

@@ -93,7 +93,7 @@ pub(super) fn examine_unrepaired(mesh: &TriMesh) -> Result<SurfaceReport, Fault>
     Ok(report)
 }
 
-/// Checks what repairs guarantee for files: finite coordinates, valid and distinct corners, no
+/// Checks the guarantees of repairs for files: finite coordinates, valid and distinct corners, no
 /// repeated face, no vertex without a face.
 fn check_indices(mesh: &TriMesh) -> Result<(), Fault> {
     let vertices = mesh.vertices.len();
@@ -257,7 +257,7 @@ impl Evidence<'_> {
 
 /// The diagonal of the bounding box, also if that has no size or its diagonal overflows.
 fn raw_diagonal(mesh: &TriMesh) -> f64 {
-    // The normalisation survives an underflow of squares, but has no answer to an overflow.
+    // The normalisation survives an underflow of squares, but not an overflow.
     match Normalisation::of(mesh) {
         Some(normalisation) => normalisation.diagonal,
         None => mesh.bounding_box().map_or(0.0, |(lo, hi)| (hi - lo).length()),
@@ -290,7 +290,7 @@ const BLOCK: usize = 512;
 /// Bound on the faces that are tested against one face.
 const MAX_TESTS_PER_FACE: usize = 10_000;
 
-/// Finds all intersections. `O(F log F + pairs)`, but gives up, and says so, after a number of
+/// Finds all intersections. `O(F log F + pairs)`, but gives up, and reports it, after a number of
 /// tests that no surface of practical use needs.
 ///
 /// `points` are scaled as [`super::mesh::Unit`] does.
@@ -412,7 +412,7 @@ mod tests {
         })
     }
 
-    /// A face scaled by 1000, cut back by a thousandth at the vertices it shares: what is left
+    /// A face scaled by 1000, cut back by a thousandth at the vertices it shares: the rest
     /// meets the other face if and only if they meet elsewhere than there.
     fn cut_back(corners: [Point; 3], shared: [bool; 3]) -> Vec<Point> {
         let large = corners.map(|p| p.map(|x| 1000 * x));

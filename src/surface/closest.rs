@@ -145,7 +145,7 @@ impl TriangleBvh {
         self.closest_from(p, None)
     }
 
-    /// The closest point to `p`. A face `start` near to it speeds up the search; the answer does not
+    /// The closest point to `p`. A face `start` near to it speeds up the search; the result does not
     /// depend on it.
     ///
     /// # Panics
@@ -156,7 +156,7 @@ impl TriangleBvh {
     }
 
     /// The closest points to many queries, in their order, in parallel. Cost per query is about
-    /// half that of single queries, as each starts from its neighbour's answer.
+    /// half that of single queries, as each starts from its neighbour's result.
     pub fn closest_batch(&self, points: &[Vec3]) -> Vec<Closest> {
         in_morton_order(points, |last: &mut u32, p| {
             let (place, closest) = self.closest_at(p, *last);
@@ -184,7 +184,7 @@ impl TriangleBvh {
     }
 
     /// The closest point to `p` that is not farther away than `bound`, if there is one. A face `start` near to it
-    /// speeds up the search; the answer does not depend on it.
+    /// speeds up the search; the result does not depend on it.
     ///
     /// # Panics
     /// If `start` is not a face.
@@ -313,7 +313,7 @@ impl<'a> Nearest<'a> {
         if squared > self.squared {
             return;
         }
-        // Of equally near faces the smallest, so that the answer does not depend on the search.
+        // Of equally near faces the smallest, so that the result does not depend on the search.
         let order = self.bvh.tree.order();
         // In a bounded search there may be no place yet: a face exactly at the bound counts.
         let first = self.place == NONE || order[place] < order[self.place];

@@ -8,7 +8,7 @@
 //! 1. Shortest edge first (ties: smaller vertex ids). Either `a` moves to `b` or `b` to `a`: the way
 //!    in which the vertices contracted so far move less. The other vertex stays in place.
 //! 2. An edge is contracted only if no vertex ends up farther than its limit from where it started.
-//! 3. Edges that the link condition refused are tried again, until nothing changes.
+//! 3. Edges that the link condition rejected are tried again, until nothing changes.
 //! 4. A component with all edges below their limits shrinks to a tetrahedron, which is dropped.
 
 use std::cmp::Reverse;
@@ -96,7 +96,7 @@ pub fn contract_short_edges(
                 None => refused.push(edge),
             }
         }
-        // An edge can be queued more than once, by each contraction beside it.
+        // An edge can be queued more than once, by each contraction next to it.
         refused.sort_unstable();
         refused.dedup();
         refused.retain(|&(_, a, b)| surface.is_edge(a, b));

@@ -72,7 +72,7 @@ pub struct InsideTest {
 impl InsideTest {
     /// Prepares the test. `O(F log F)`.
     ///
-    /// The answers mean something only for a closed, consistently oriented surface.
+    /// The results are meaningful only for a closed, consistently oriented surface.
     ///
     /// # Panics
     /// If a face names a vertex that does not exist.

@@ -23,7 +23,7 @@ pub enum Components {
     Largest,
 }
 
-/// Repairs on demand, beside those of [`read`](super::read).
+/// Repairs on demand, besides those of [`read`](super::read).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MendOptions {
     /// Whether holes are closed by triangles between their vertices, with the largest dihedral angle
@@ -41,7 +41,7 @@ pub struct MendOptions {
 /// in order.
 ///
 /// # Errors
-/// As [`read`](super::read) for what is left after the repairs, and when a hole is too long to be
+/// As [`read`](super::read) after the repairs, and when a hole is too long to be
 /// filled, meets itself, or cannot be closed without edges that are there already.
 ///
 /// # Cost
@@ -145,7 +145,7 @@ fn keep_largest(mesh: &mut TriMesh) -> Option<Repair> {
 // - The filling is neither refined nor smoothed, because that would add and move vertices.
 //
 // # Cost
-// `O(n^3)` time and `O(n^2)` memory for a loop of `n` edges, so that long loops are refused.
+// `O(n^3)` time and `O(n^2)` memory for a loop of `n` edges, so that long loops are rejected.
 
 /// Number of edges of the longest loop that is filled.
 const MAX_EDGES: usize = 500;
@@ -265,13 +265,13 @@ struct Best {
     normal: Vec3,
 }
 
-/// A loop with what surrounds it.
+/// A loop with its surroundings.
 struct Patch<'a> {
     corners: &'a [u32],
     /// Positions of the corners, in a unit in which nothing overflows.
     points: Vec<Vec3>,
-    /// Unit normal of the surface beside the edge from each corner to the next.
-    beside: Vec<Vec3>,
+    /// Unit normal of the surface next to the edge from each corner to the next.
+    rim_normals: Vec<Vec3>,
     edges: &'a HashSet<[u32; 2]>,
     /// `W(i, k)` at `i n + k`; `None` where there is no triangulation.
     best: Vec<Option<Best>>,
@@ -293,8 +293,8 @@ impl<'a> Patch<'a> {
         let scaled = |v: u32| (vertices[v as usize] - origin) / reach;
         let points = corners.iter().map(|&v| scaled(v)).collect();
         let faces_at = (0..n).map(|i| face_at[&[corners[i], corners[(i + 1) % n]]]);
-        let beside = faces_at.map(|face| normal(faces[face as usize].map(scaled))).collect();
-        Self { corners, points, beside, edges, best: vec![None; n * n] }
+        let rim_normals = faces_at.map(|face| normal(faces[face as usize].map(scaled))).collect();
+        Self { corners, points, rim_normals, edges, best: vec![None; n * n] }
     }
 
     /// Steps 2 and 3.
@@ -339,7 +339,7 @@ impl<'a> Patch<'a> {
             let own = normal(triangle);
             let mut angle = angle.max(between(own, low.1)).max(between(own, high.1));
             if whole {
-                angle = angle.max(between(own, self.beside[n - 1]));
+                angle = angle.max(between(own, self.rim_normals[n - 1]));
             }
             let [a, b, c] = triangle;
             let area = low.0.area + high.0.area + (b - a).cross(c - a).length() * 0.5;
@@ -351,10 +351,10 @@ impl<'a> Patch<'a> {
         best
     }
 
-    /// The weight of a chain and the normal beside its chord: of the surface, or of the triangle.
+    /// The weight of a chain and the normal next to its chord: of the surface, or of the triangle.
     fn chain(&self, i: usize, k: usize) -> Option<(Weight, Vec3)> {
         if k == i + 1 {
-            return Some((Weight { angle: 0.0, area: 0.0 }, self.beside[i]));
+            return Some((Weight { angle: 0.0, area: 0.0 }, self.rim_normals[i]));
         }
         self.best[i * self.corners.len() + k].map(|best| (best.weight, best.normal))
     }
@@ -372,7 +372,7 @@ fn between(a: Vec3, b: Vec3) -> f64 {
 // Parts that touch in a vertex, taken apart; the only repair that moves a vertex.
 //
 // At such a vertex the faces form several fans. The flattest fan keeps the vertex. Each other one
-// gets a vertex of its own, at [`STEP`] of the way to the mean of its rim: towards its own part, so
+// gets a separate vertex, at [`STEP`] of the way to the mean of its rim: towards its own part, so
 // that two tips no longer touch. The flattest fan stays because it cannot move like this: the mean of
 // a flat fan's rim may be the vertex itself.
 //
@@ -385,7 +385,7 @@ const STEP: f64 = 1e-3;
 /// Corners (`3 face + k`) of the faces that hang together around one vertex.
 type Fan = Vec<usize>;
 
-/// Gives each fan of faces a vertex of its own.
+/// Gives each fan of faces a separate vertex.
 pub(super) fn separate(vertices: &mut Vec<Vec3>, faces: &mut [[u32; 3]]) -> Option<Repair> {
     let (mut touching, mut largest_move) = (0, 0.0_f64);
     for (vertex, mut fans) in fans(vertices.len(), faces).into_iter().enumerate() {

@@ -13,7 +13,7 @@ use crate::atomic::write_atomically;
 
 /// An indexed triangle mesh. Faces are counter-clockwise seen from outside once oriented.
 ///
-/// The type itself promises nothing but valid indices; [`crate::surface`] holds the checks.
+/// The type itself guarantees only valid indices; [`crate::surface`] holds the checks.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriMesh {
     /// Positions, in the unit of the file or of the generator.
@@ -41,7 +41,7 @@ impl TriMesh {
 /// The similarity that carries input coordinates to normalised ones: `x -> (x - origin) / diagonal`.
 ///
 /// Normalised shapes have a bounding-box diagonal of 1, so every error is a fraction of it and
-/// constants such as Q-MAT's `k` mean what their paper says.
+/// constants such as Q-MAT's `k` keep the meaning of their paper.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Normalisation {
     /// Centre of the input's bounding box, in input units.
@@ -147,7 +147,7 @@ fn times_power(mut value: f64, mut power: i32) -> f64 {
     value
 }
 
-/// Writes a mesh in the format that the extension tells: `.off`, `.obj` or `.ply`.
+/// Writes a mesh in the format of the extension: `.off`, `.obj` or `.ply`.
 ///
 /// A file of that name is replaced, but only by a complete one.
 ///

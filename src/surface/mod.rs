@@ -5,8 +5,8 @@
 //! ```
 //!
 //! [`read`] gives a mesh only if it bounds a solid: closed, manifold, oriented outward, with
-//! positive volume. Whatever was changed on the way, and whatever may spoil results without being
-//! a reason to refuse (intersecting faces, faces without area), is in its [`SurfaceReport`].
+//! positive volume. All changes on the way, and defects that may spoil results without being
+//! an error (intersecting faces, faces without area), are in its [`SurfaceReport`].
 //! Every sign that a decision depends on is computed exactly.
 
 mod check;
@@ -44,17 +44,17 @@ pub use sample::{ParseSamplingError, Sampling, sample, sample_with_faces};
 pub struct Loaded {
     /// The mesh, in the unit of the file.
     pub mesh: TriMesh,
-    /// What was found and repaired.
+    /// Findings and repairs.
     pub report: SurfaceReport,
 }
 
-/// A surface of any kind, as far as it could be examined: the answer of `medial info`.
+/// A surface of any kind, as far as it could be examined: the output of `medial info`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Inspection {
-    /// What was found and repaired.
+    /// Findings and repairs.
     #[serde(flatten)]
     pub report: SurfaceReport,
-    /// Why [`read`] refuses this surface, if it does.
+    /// The error of [`read`] for this surface, if any.
     #[serde(serialize_with = "as_message")]
     pub refused: Option<SurfaceError>,
 }
@@ -66,11 +66,11 @@ fn as_message<S: serde::Serializer>(
     refused.as_ref().map(ToString::to_string).serialize(serializer)
 }
 
-/// Reads a surface, repairs it and checks it. The extension tells the format (`.off`, `.obj`,
+/// Reads a surface, repairs it and checks it. The extension decides the format (`.off`, `.obj`,
 /// `.ply`, `.stl`).
 ///
 /// # Errors
-/// When the file cannot be read, is not what its extension says, or does not bound a solid after
+/// When the file cannot be read, does not match its extension, or does not bound a solid after
 /// the repairs. The error names the file and the line or element.
 ///
 /// # Cost
@@ -94,7 +94,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Loaded, SurfaceError> {
 /// `path`, which is not opened.
 ///
 /// # Errors
-/// When the bytes are not what the extension says, or have no triangle with an area.
+/// When the bytes do not match the extension, or have no triangle with an area.
 pub fn read_any(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Loaded, SurfaceError> {
     let path = path.as_ref();
     let examined = Format::of(path).and_then(|format| examine(bytes, format));
@@ -134,7 +134,7 @@ pub fn read_bytes(bytes: &[u8], format: Format) -> Result<Loaded, SurfaceError> 
 ///
 /// # Errors
 /// When the file cannot be read or understood, or holds no face. A surface that is open,
-/// non-manifold or otherwise refused is no error here; see [`Inspection::refused`].
+/// non-manifold or otherwise rejected is no error here; see [`Inspection::refused`].
 pub fn inspect(path: impl AsRef<Path>) -> Result<Inspection, SurfaceError> {
     let path = path.as_ref();
     let examined = load(path).map_err(|fault| in_file(path, fault))?;

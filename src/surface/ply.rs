@@ -2,13 +2,13 @@
 //!
 //! `ply-rs-bw` parses the header and binary rows. Around it:
 //! - The header reaches the crate as UTF-8 with LF line ends: files exist with CR alone and with comments in other
-//!   encodings, and the crate refuses both.
-//! - Text rows are read here, because the crate refuses numbers such as `1.`, `.5` and `nan`. All of them are read in
-//!   double precision, whatever precision the header declares.
+//!   encodings, and the crate rejects both.
+//! - Text rows are read here, because the crate rejects numbers such as `1.`, `.5` and `nan`. All of them are read in
+//!   double precision, for any precision that the header declares.
 //! - Counts of the header are compared with the bytes that follow before a row is read.
 //! - Rows are handed on one by one, so that memory is that of the result, and faults name the line or the element.
 //!
-//! In a text file every element has a line of its own. Values behind the declared ones are ignored, as are other
+//! In a text file every element has its own line. Values behind the declared ones are ignored, as are other
 //! elements and properties, and lines or bytes after the last element.
 
 use std::fmt;
@@ -150,7 +150,7 @@ impl Ply<'_> {
     /// Hands all rows on in their order: the name of the element, the number of the row in it, its place, its values.
     ///
     /// # Errors
-    /// When a row is missing or not what the header declares, or `take` fails.
+    /// When a row is missing or contradicts the header, or `take` fails.
     pub fn rows<E: From<Fault>>(
         &self,
         mut take: impl FnMut(&str, usize, &Place, Row) -> Result<(), E>,
@@ -209,7 +209,7 @@ fn text_row(
         for _ in 0..count(cursor, length, what)? {
             if let "vertex_indices" | "vertex_index" = &**name {
                 let index = cursor.token_on_line();
-                // The largest index names no vertex, so that a larger number is refused, too.
+                // The largest index names no vertex, so that a larger number is rejected, too.
                 let index = count(cursor, index, what)?.min(u32::MAX as usize);
                 row.corners.push(index as u32);
             } else {
@@ -220,7 +220,7 @@ fn text_row(
     Ok(row)
 }
 
-/// A fault of the crate in one line: what is wrong and the text that is, without line number and Rust's debug output.
+/// A fault of the crate in one line: the problem and the text, without line number and Rust's debug output.
 fn fault(at: Place, expected: &str, error: &ParseError) -> Fault {
     const MOST: usize = 80;
     let text = error.to_string();

@@ -4,13 +4,13 @@
 //!   keyword is required, counts may follow it even without a blank (`OFF490 518 0` is how ModelNet40 begins), the
 //!   number of edges may be missing. A line with too few or too many numbers is an error; only if the file has too few
 //!   lines for one vertex or face on each, they are taken from one stream of numbers. Numbers after the last face are an
-//!   error, since a count must be wrong; other text after it gives a warning. `4OFF`, `nOFF`, `OFF BINARY` are refused.
+//!   error, since a count must be wrong; other text after it gives a warning. `4OFF`, `nOFF`, `OFF BINARY` are errors.
 //! - Wavefront OBJ: the statements `v` and `f`. A face may name vertices that follow it; negative indices count back from
 //!   the last vertex before the face. Weights and colours of vertices are passed over. The crate `tobj` joins no lines
 //!   that end with a backslash, takes a face of two corners for a line, and numbers vertices by their first use: other
 //!   vertex order, other samples, other results.
-//! - STL, text and binary, told apart by content: a binary file has 84 bytes and 50 for each announced triangle,
-//!   whatever its first words are. The crate `stl_io` takes a binary file that begins with `solid` for text, and reads
+//! - STL, text and binary, distinguished by content: a binary file has 84 bytes and 50 for each announced triangle,
+//!   with any first words. The crate `stl_io` takes a binary file that begins with `solid` for text, and reads
 //!   text in single precision.
 //! - PLY: [`super::ply`].
 //!
@@ -39,10 +39,10 @@ pub enum Format {
 }
 
 impl Format {
-    /// The format that the extension of a path stands for, in upper or lower case.
+    /// The format of a path's extension, in upper or lower case.
     ///
     /// # Errors
-    /// [`Fault::UnknownFormat`] when it stands for none.
+    /// [`Fault::UnknownFormat`] when it is unknown.
     pub fn of(path: &Path) -> Result<Self, Fault> {
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         match extension.as_str() {
@@ -80,7 +80,7 @@ pub(super) fn parse(bytes: &[u8], format: Format) -> Result<PolygonSoup, Fault> 
     }
 }
 
-/// The content of a regular file: a pipe or a device could go on for ever.
+/// The content of a regular file: a pipe or a device may never end.
 pub(super) fn content(path: &Path) -> Result<Vec<u8>, Fault> {
     match fs::metadata(path) {
         Ok(target) if !target.is_file() => {
@@ -103,7 +103,7 @@ pub(super) struct PolygonSoup {
     pub ends: Vec<u32>,
     /// Line of each polygon, or nothing for a binary file.
     pub lines: Vec<u32>,
-    /// What the reader passed over.
+    /// Skipped parts of the file.
     pub warnings: Vec<String>,
 }
 
@@ -138,7 +138,7 @@ impl PolygonSoup {
         &self.corners[start..self.ends[index] as usize]
     }
 
-    /// Where a polygon stands in the file.
+    /// The place of a polygon in the file.
     pub fn place(&self, index: usize) -> Place {
         match self.lines.get(index) {
             Some(&line) => Place::Line(line as usize),
@@ -166,7 +166,7 @@ impl PolygonSoup {
         Ok(())
     }
 
-    /// Adds a position with a corner of its own.
+    /// Adds a position with a new corner.
     fn push_corner(&mut self, xyz: [f64; 3], at: impl FnOnce() -> Place) -> Result<(), Fault> {
         self.push_vertex(xyz, at)?;
         self.corners.push(self.vertices.len() as u32 - 1);
@@ -478,7 +478,7 @@ fn split_keyword(text: &[u8]) -> Option<(&[u8], &[u8])> {
     for word in known {
         left = left.strip_prefix(word).unwrap_or(left);
     }
-    // Writers that put them in another order are understood all the same.
+    // Writers that put them in another order are still understood.
     let swapped = prefix == b"NC";
     ((left.is_empty() || swapped) && rest.iter().all(u8::is_ascii_digit)).then_some((prefix, rest))
 }
@@ -609,7 +609,7 @@ fn finish_face_line(cursor: &mut Cursor<'_>) -> Result<(), Fault> {
 
 // OBJ.
 
-/// Keywords of the format that do not concern the surface. Others give a warning: the file may be another thing.
+/// Keywords of the format that do not concern the surface. Others give a warning: the format may be another one.
 const PASSED_OVER: &str = " vn vt vp g o s l p usemtl mtllib usemap maplib mg vc bevel bmat bsp bzp c_interp call con csh \
     cstype ctech curv curv2 d_interp deg end hole lod parm res scrv shadow_obj sp stech step trace_obj trim ";
 

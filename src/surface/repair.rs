@@ -5,7 +5,7 @@
 //!    every file: it would close intended slits and tear thin walls. Formats that repeat vertices
 //!    (STL, OBJ with seams) repeat them bit by bit.
 //! 3. Drop corners that repeat their predecessor, then faces with fewer than three corners.
-//! 4. Drop faces with the same corners as an earlier one, whatever their orientation. Two faces that
+//! 4. Drop faces with the same corners as an earlier one, in any orientation. Two faces that
 //!    share all sides with each other and none with a third face stay: they are a component without
 //!    volume, which is reported as such.
 //! 5. Triangulate polygons.
@@ -235,8 +235,8 @@ fn compact(vertices: usize, faces: &mut [[u32; 3]]) -> Vec<u32> {
 // 2. A quadrilateral: cut along the shorter of the diagonals that leave two left turns.
 // 3. Otherwise clip ears: strictly convex corners whose triangle holds no reflex corner.
 // 4. Where no ear is left, the polygon crosses itself in projection: clip the next convex
-//    corner, or any. Whatever happens, the triangles fill a disc bounded by the polygon, so the
-//    surface stays as closed as it was, and the check for self-intersections tells the rest.
+//    corner, or any. In any case the triangles fill a disc bounded by the polygon, so the
+//    surface stays as closed as it was, and the check for self-intersections finds the rest.
 //
 // All turns are decided by exact predicates. A hole joined to the outline by a doubled edge
 // (the same vertices twice) is cut correctly.
@@ -255,7 +255,7 @@ pub(super) struct Triangulator {
 pub(super) struct TooIntricate;
 
 impl Triangulator {
-    /// For a soup with so many corners in all. Ear clipping is cubic at worst; the budget makes
+    /// For a soup with this number of corners in all. Ear clipping is cubic at worst; the budget makes
     /// the time of a whole file linear.
     pub fn new(corners: usize) -> Self {
         Self { budget: 50_000_000 + 2_000 * corners as u64, crossing: 0 }
@@ -355,7 +355,7 @@ struct Ring<'a> {
     previous: Vec<u32>,
     /// Corners that are not strictly convex, in no order.
     reflex: Vec<u32>,
-    /// Where a corner stands in `reflex`.
+    /// The place of a corner in `reflex`.
     position: Vec<u32>,
     len: usize,
 }

@@ -56,7 +56,7 @@ impl fmt::Display for Place {
 /// A place in front of a sentence that names the element itself.
 fn before(at: &Place) -> String {
     match at {
-        // In a binary file the place is the element: it would stand in the message twice.
+        // In a binary file the place is the element: it would be in the message twice.
         Place::Element(..) => String::new(),
         place => format!("{place}: "),
     }
@@ -91,7 +91,7 @@ pub enum Fault {
     /// The format is known, but not this variant or not in this direction.
     #[error("{0}")]
     Unsupported(String),
-    /// Something else stands where the format demands a certain thing.
+    /// Something else is in a place where the format demands a certain thing.
     #[error("{at}: expected {expected}, found {found}")]
     Syntax { at: Place, expected: String, found: String },
     /// The header announces more than the file holds, or less.
@@ -127,7 +127,7 @@ pub enum Fault {
     NoFaces { vertices: usize },
     /// Every face has corners at the same position.
     #[error(
-        "no face is left of {}: each has corners at the same position; if that is not meant, the \
+        "no face is left of {}: each has corners at the same position; if that is unexpected, the \
          surface is too small for its distance from the origin: move it there before writing it",
         counted(*.faces, "face")
     )]
@@ -145,7 +145,7 @@ pub enum Fault {
     )]
     Open { edges: usize, first: [VertexName; 2] },
     /// A hole that is too long to be filled.
-    #[error("the hole at {first} has {edges} edges, and holes of up to {most} are filled")]
+    #[error("the hole at {first}: too long to fill (found {edges} edges, expected at most {most})")]
     LongHole { edges: usize, most: usize, first: VertexName },
     /// A hole that no triangles close.
     #[error(
@@ -156,7 +156,7 @@ pub enum Fault {
     /// Edges with more than two faces.
     #[error(
         "the surface is not manifold: {} with more than two faces, the first ({faces} faces) \
-         from {} to {}; inner walls and doubled parts have to go, and which they are only its maker knows",
+         from {} to {}; remove inner walls and doubled parts in a mesh editor",
         counted(*.edges, "edge"), .first[0], .first[1]
     )]
     NonManifoldEdge { edges: usize, first: [VertexName; 2], faces: usize },
@@ -177,8 +177,8 @@ pub enum Fault {
         counted(*.faces, "face")
     )]
     ZeroVolume { face: usize, faces: usize },
-    /// So many components around one another that it takes too long to tell solid from cavity.
-    #[error("{components} components lie too densely around one another to tell their nesting")]
+    /// Too many components around one another to separate solid from cavity in time.
+    #[error("{components} components lie too densely around one another to find their nesting")]
     TooManyNested { components: usize },
     /// Only from [`crate::surface::validate`]: a face that names a vertex twice.
     #[error("face {face} names a vertex twice")]
@@ -198,7 +198,7 @@ pub enum Fault {
     WrongWay { face: usize },
 }
 
-/// The properties of a surface: the answer of `medial info`.
+/// The properties of a surface: the output of `medial info`.
 ///
 /// Numbers describe the mesh after the listed repairs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -244,9 +244,9 @@ pub struct SurfaceReport {
     /// Enclosed volume in the cubed unit of the file, overlaps counted as often as they occur;
     /// unknown for an open surface and where it overflows or underflows.
     pub volume: Option<f64>,
-    /// What was changed, in the order in which it was done.
+    /// The changes, in order.
     pub repairs: Vec<Repair>,
-    /// What was not changed, but may spoil results.
+    /// Unchanged defects that may spoil results.
     pub warnings: Vec<String>,
 }
 
@@ -269,7 +269,7 @@ pub enum Repair {
     DroppedUnreferencedVertices { vertices: usize },
     /// Faces that disagreed with their neighbours were turned over.
     ReorientedFaces { faces: usize },
-    /// Parts beside the largest were left out, on demand.
+    /// Parts other than the largest were left out, on demand.
     DroppedComponents { components: usize, faces: usize },
     /// Parts that touched in a vertex were drawn back from it, on demand.
     SeparatedVertices {

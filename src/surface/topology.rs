@@ -14,7 +14,7 @@ use crate::Vec3;
 use crate::geometry::DisjointSets;
 use crate::sum::Sum;
 
-/// Adjacency, defects and components of a triangle mesh, whatever its defects.
+/// Adjacency, defects and components of a triangle mesh, with any defects.
 #[derive(Debug, Default)]
 pub(super) struct Topology {
     /// The half-edge across each half-edge, or [`NONE`] where there is none or more than one.
@@ -187,7 +187,7 @@ fn corner_at(faces: &[[u32; 3]], half_edge: u32, vertex: u32) -> u32 {
 //
 // 1. Within a component all faces follow the first one (breadth over common edges).
 // 2. A component is turned by the sign of the volume it encloses. A volume within its own
-//    rounding error counts as none and is refused.
+//    rounding error counts as none and is rejected.
 // 3. A component is a cavity if it lies in an odd number of others (see [`super::nesting`]).
 
 /// How a component is oriented, and how it should be.
@@ -207,7 +207,7 @@ impl Shell {
         self.depth % 2 == 1
     }
 
-    /// Whether its two sides coincide, as far as doubles can tell.
+    /// Whether its two sides coincide, to double precision.
     pub fn is_flat(&self) -> bool {
         self.volume.abs() <= self.rounding
     }
@@ -242,7 +242,7 @@ pub(super) fn turn_over(faces: &mut [[u32; 3]], marked: impl Iterator<Item = boo
     }
 }
 
-/// What turning faces amounts to: `turned` marks faces that disagreed with the first face of
+/// The effect of turning faces: `turned` marks faces that disagreed with the first face of
 /// their component, `wrong` the components that were turned as a whole afterwards.
 pub(super) fn repairs(
     turned: &[bool],

@@ -5,7 +5,7 @@ use medial::surface::{self, Fault, Repair};
 use medial_test_support::{medial_meshes, table};
 
 #[test]
-fn good_meshes_are_what_the_manifest_says() {
+fn good_meshes_match_the_manifest() {
     let Some(folder) = medial_test_support::meshes() else { return };
     let rows = table(&folder.join("MANIFEST.csv"));
     assert!(rows.len() >= 12);
@@ -31,14 +31,14 @@ fn good_meshes_are_what_the_manifest_says() {
         assert!((r.diagonal / diagonal - 1.0).abs() < 1e-5, "{}", row["file"]);
         assert!(r.repairs.is_empty() && r.warnings.is_empty(), "{}: {r:?}", row["file"]);
         assert!(r.volume.unwrap() > 0.0);
-        // What reading guarantees is what checking demands.
+        // Reading guarantees all that checking demands.
         let checked = surface::validate(&loaded.mesh).unwrap();
         assert_eq!(checked, *r);
     }
 }
 
 #[test]
-fn bad_files_get_what_the_manifest_expects() {
+fn bad_files_have_the_errors_of_the_manifest() {
     let Some(folder) = medial_test_support::meshes() else { return };
     let folder = folder.join("bad");
     for row in table(&folder.join("MANIFEST.csv")) {
@@ -119,7 +119,7 @@ fn obj_files_agree_with_tobj() {
 // Every published medial mesh of the shared collection, where it is present.
 
 #[test]
-fn published_medial_meshes_hold_what_the_manifest_says() {
+fn published_medial_meshes_match_the_manifest() {
     let Some(folder) = medial_meshes() else { return };
     let rows = table(&folder.join("MANIFEST.csv"));
     assert!(rows.len() >= 20);
@@ -141,7 +141,7 @@ fn published_medial_meshes_hold_what_the_manifest_says() {
         let loaded = loaded.unwrap_or_else(|error| panic!("{error}"));
         let mesh = &loaded.mesh;
         let live = |key: &str| row[key].parse::<usize>().expect("a count");
-        // The sides of its only face are not listed there: they are added, and a note says so.
+        // The sides of its only face are not listed there: they are added, with a note.
         let added = if name == "blender_slab.ma" { 3 } else { 0 };
         assert_eq!(mesh.spheres.len(), live("spheres_live"), "{name}");
         assert_eq!(mesh.edges.len(), live("edges_live") + added, "{name}");

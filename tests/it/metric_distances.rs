@@ -216,7 +216,7 @@ fn a_union_of_buried_balls_is_sampled_until_enough_are_found() {
     let union = MedialUnion::new(&mesh).unwrap();
     let options = EnvelopeOptions { samples: 400, burial: 1e-9, seed: 1 };
     let points = sample_envelope(&mesh, &union, &options).unwrap();
-    // Ten candidates for each sample asked give some tens.
+    // Ten candidates for each requested sample give some tens.
     assert!((80..=400).contains(&points.len()), "{}", points.len());
     assert!(points.iter().all(|&p| union.signed(p).abs() < 1e-9));
 }
@@ -306,7 +306,7 @@ fn results_do_not_depend_on_threads() {
 }
 
 #[test]
-fn what_cannot_be_measured_is_refused() {
+fn unmeasurable_inputs_are_rejected() {
     let (surface, axis) = cuboid(3.0, 2.0, 1.0);
     let bvh = TriangleBvh::new(&surface).unwrap();
     let options = DistanceOptions { surface_samples: 10, envelope_samples: 10, seed: 0 };
@@ -350,7 +350,7 @@ fn certified(surface: &TriMesh, mesh: &MedialMesh, tolerance: f64) -> Certificat
     let bvh = TriangleBvh::new(surface).unwrap();
     let certificate = certify(surface, &bvh, mesh, tolerance).unwrap();
     assert!(certificate.upper - certificate.lower <= tolerance, "{certificate:?}");
-    // The lower end is the distance of the witness, which is where it is said to be.
+    // The lower end is the distance of the witness, which lies where `on` says.
     let Witness { point, on } = certificate.witness;
     let signed = MedialUnion::new(mesh).unwrap().signed(point);
     let to_surface = bvh.closest(point).distance;
@@ -467,7 +467,7 @@ fn the_interval_agrees_with_samples_on_random_meshes() {
 }
 
 #[test]
-fn what_cannot_be_certified_is_refused() {
+fn uncertifiable_tolerances_are_rejected() {
     let surface = centred_cuboid(Vec3::splat(0.3));
     let bvh = TriangleBvh::new(&surface).unwrap();
     let mesh = complex(&[(Vec3::ZERO, 0.2)], &[], &[]);

@@ -1,7 +1,7 @@
-//! Metrics under rigid motion, scaling and renumbering of what is measured.
+//! Metrics under rigid motion, scaling and renumbering of the input.
 //!
 //! Samples are laid out in a frame that moves along with both, in an order that does not depend on that
-//! of the file. Certified intervals depend on the coordinate axes; but what they hold does not, so the
+//! of the file. Certified intervals depend on the coordinate axes; but the enclosed values do not, so the
 //! intervals of both have a value in common, at every tolerance.
 
 use Symmetry::{Broken, Shared};
@@ -361,7 +361,7 @@ fn with_radii(of: impl Fn(f64) -> f64) -> MedialMesh {
 #[test]
 fn radii_that_do_not_fit_are_named() {
     assert!(warnings(&cuboid().1).is_empty(), "{:?}", warnings(&cuboid().1));
-    for (factor, told) in [
+    for (factor, ratio) in [
         (1e-3, " 1.0e-3 times"),
         (0.0, " 0.0e0 times"),
         (0.02, " 0.020 times"),
@@ -371,7 +371,7 @@ fn radii_that_do_not_fit_are_named() {
         (2.0, " 2.000 times"),
     ] {
         let found = warnings(&with_radii(|r| factor * r));
-        assert!(found.iter().any(|w| w.contains("radii") && w.contains(told)), "{found:?}");
+        assert!(found.iter().any(|w| w.contains("radii") && w.contains(ratio)), "{found:?}");
     }
     let squared = warnings(&with_radii(|r| r * r));
     assert!(squared.iter().any(|w| w.contains("squared")), "{squared:?}");
@@ -388,7 +388,7 @@ fn other_units_and_other_places_are_named() {
     assert!(moved.iter().any(|w| w.contains("moved, or of another mesh")), "{moved:?}");
 }
 
-/// What a poor simplification does to radii is no misfit of the file.
+/// The change of radii by a poor simplification is no misfit of the file.
 #[test]
 fn poor_results_are_not_taken_for_misfits() {
     let (_, axis) = cuboid();

@@ -79,7 +79,7 @@ fn closest_points_match_brute_force() {
         if p.length() < 10.0 {
             assert_describes(&mesh, p, &closest);
         }
-        // Not only close: the same answer, whatever the search started from.
+        // Not only close: the same result from any start of the search.
         assert_eq!(batch[k], closest);
         assert_eq!(distances[k], closest.distance);
         assert_eq!(bvh.closest_from(p, Some(k as u32 % 400)), closest);
@@ -93,7 +93,7 @@ fn closest_points_match_brute_force() {
 }
 
 #[test]
-fn features_are_told_apart() {
+fn features_are_distinguished() {
     let vertices = vec![Vec3::ZERO, Vec3::X, 2.0 * Vec3::Y];
     for turn in 0..3 {
         let mut face = [0, 1, 2];
@@ -194,7 +194,7 @@ fn union_distances_match_brute_force() {
 }
 
 #[test]
-fn answers_do_not_depend_on_threads() {
+fn results_do_not_depend_on_threads() {
     let mut rng = Pcg64::seed_from_u64(13);
     let (mesh, surface) = (complex(200, 0.3, &mut rng), soup(500, &mut rng));
     let queries: Vec<Vec3> = (0..5000).map(|_| vector(&mut rng) * 1.5).collect();
@@ -262,10 +262,10 @@ fn closest_points_are_those_of_single_triangles() {
 }
 
 /// Balls that nearly coincide, as in the initial medial mesh of a sphere: bit for bit the least of
-/// all, although nearly all are nearly as near; to within what counts as equal where they are equal
+/// all, although nearly all are nearly as near; to the tolerance of equality where they are equal
 /// but for rounding.
 #[test]
-fn nearly_coincident_balls_are_told_apart() {
+fn nearly_coincident_balls_are_distinguished() {
     let mut rng = Pcg64::seed_from_u64(15);
     let middle = Vec3::new(0.2, -0.1, 0.3);
     for spread in [1e-2, 1e-6, 1e-10, 1e-14, 0.0] {

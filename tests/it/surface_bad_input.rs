@@ -11,7 +11,7 @@ use medial::surface::{self, Fault, Format, Loaded, Repair};
 use proptest::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// Counts what the current thread holds, and the most it ever held.
+/// Counts the bytes of the current thread, and their maximum.
 struct Counting;
 
 thread_local! {
@@ -39,7 +39,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-/// Reads within one thread and checks the promise about memory: 16 MB and 100 times the size.
+/// Reads within one thread and checks the limit of memory: 16 MB and 100 times the size.
 fn read(bytes: &[u8], format: Format) -> Result<Loaded, surface::SurfaceError> {
     static ONE_THREAD: LazyLock<ThreadPool> =
         LazyLock::new(|| ThreadPoolBuilder::new().num_threads(1).build().unwrap());
@@ -50,7 +50,7 @@ fn read(bytes: &[u8], format: Format) -> Result<Loaded, surface::SurfaceError> {
         let (peak, size) = (PEAK.with(Cell::get).saturating_sub(start), bytes.len());
         assert!(peak <= 16_000_000 + 100 * size, "{peak} bytes for a file of {size}");
         if let Ok(loaded) = &result {
-            surface::validate(&loaded.mesh).expect("reading guarantees what validation demands");
+            surface::validate(&loaded.mesh).expect("reading guarantees validity");
         }
         result
     })
@@ -84,7 +84,7 @@ fn hand_written_defects_are_repaired_and_reported() {
     assert_eq!(repairs(&inward), [Repair::TurnedOutward { components: 1 }]);
     let mixed = cube_with(|f| f[3..6].iter_mut().for_each(|face| face.swap(0, 1)));
     assert_eq!(repairs(&mixed), [Repair::ReorientedFaces { faces: 3 }]);
-    // The first face decides what the others follow, but not which ones are reported.
+    // The first face decides the orientation of the others, but not which ones are reported.
     let first = cube_with(|f| f[0].swap(0, 1));
     assert_eq!(repairs(&first), [Repair::ReorientedFaces { faces: 1 }]);
     let loose = cube_with(|_| {}).replace("OFF\n8 ", "OFF\n9 ").replacen(
@@ -344,7 +344,7 @@ fn every_format_holds_the_same_octahedron() {
 }
 
 #[test]
-fn every_truncation_is_an_answer() {
+fn every_truncation_has_a_result() {
     for (bytes, format) in valid_files() {
         for length in 0..bytes.len() {
             // Only blanks or a closing word may be missing.

@@ -127,7 +127,7 @@ fn batches_equal_single_queries_for_any_number_of_threads() {
 }
 
 #[test]
-fn hostile_queries_and_meshes_have_answers() {
+fn hostile_queries_and_meshes_have_results() {
     let test = InsideTest::new(&cube());
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, 1e300] {
         assert_eq!(test.side(Vec3::new(bad, 0.5, 0.5)), Side::Outside);
@@ -283,7 +283,7 @@ fn distribution_follows_area() {
 fn blue_noise_keeps_its_distance() {
     let mesh = torus(60, 30);
     let area = 4.0 * std::f64::consts::PI.powi(2) * 2.0;
-    // Spacing of the densest packing of so many points on this area.
+    // Spacing of the densest packing of this number of points on this area.
     let densest = (2.0 * area / (3.0_f64.sqrt() * 2_000.0)).sqrt();
     let mut blue = spacings(&sample(&mesh, &BLUE));
     let mut uniform = spacings(&sample(&mesh, &Sampling::AreaUniform { count: 2_000, seed: 5 }));

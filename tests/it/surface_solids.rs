@@ -114,7 +114,7 @@ fn validation_repairs_nothing() {
 }
 
 #[test]
-fn inspection_reports_what_reading_refuses() {
+fn inspection_reports_surfaces_that_reading_rejects() {
     let mut open = cube();
     open.faces.truncate(10);
     let path = std::env::temp_dir().join(format!("medial-open-{}.off", std::process::id()));
@@ -331,7 +331,7 @@ fn the_largest_part_is_kept() {
 }
 
 #[test]
-fn what_is_flat_after_the_repair_is_still_refused() {
+fn surfaces_that_are_flat_after_the_repair_are_rejected() {
     let triangle = TriMesh { vertices: vec![Vec3::ZERO, Vec3::X, Vec3::Y], faces: vec![[0, 1, 2]] };
     let fault = mend(&triangle, FILL).expect_err("flat").fault;
     assert!(!fault.to_string().is_empty());

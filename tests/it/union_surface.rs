@@ -130,27 +130,27 @@ fn loops_and_voids_of_the_union_are_those_of_the_surface() {
 }
 
 #[test]
-fn it_stops_when_it_is_told_to() {
+fn it_stops_when_the_callback_returns_false() {
     let ball = mesh(&[([0.0; 3], 1.0)], &[], &[]);
     let within = |most: usize| {
-        let mut asked = 0;
+        let mut calls = 0;
         let made = union_surface_while(&ball, 0.1, 1 << 24, || {
-            asked += 1;
-            asked <= most
+            calls += 1;
+            calls <= most
         });
-        (made, asked)
+        (made, calls)
     };
-    let (whole, questions) = within(usize::MAX);
+    let (whole, calls) = within(usize::MAX);
     assert_eq!(whole, union_surface(&ball, 0.1));
-    // It is asked in every round of the refinement, and last while edges are contracted.
-    assert!(questions > 12, "{questions}");
-    for most in [0, 1, 10, questions - 1] {
+    // It is called in every round of the refinement, and last while edges are contracted.
+    assert!(calls > 12, "{calls}");
+    for most in [0, 1, 10, calls - 1] {
         assert!(matches!(within(most).0, Err(ContourError::Cancelled)), "{most}");
     }
 }
 
 #[test]
-fn what_cannot_be_shown_is_said() {
+fn unusable_tolerances_and_meshes_are_errors() {
     let ball = mesh(&[([0.0; 3], 1.0)], &[], &[]);
     assert!(matches!(union_surface(&ball, 0.0), Err(ContourError::Tolerance(_))));
     assert!(matches!(union_surface(&ball, f64::NAN), Err(ContourError::Tolerance(_))));

@@ -1,7 +1,7 @@
-//! What tests may lack on a machine, and how they say so.
+//! Missing meshes and programs of tests, with notices.
 //!
-//! Meshes that cannot be redistributed are in `$MEDIAL_MESHES`, by default in `shared/meshes` beside the
-//! repository. Where they are missing, a test is skipped: it says so on standard error, and in the file
+//! Meshes that cannot be redistributed are in `$MEDIAL_MESHES`, by default in `shared/meshes` next to the
+//! repository. Where they are missing, a test is skipped, with a notice on standard error, and in the file
 //! `$MEDIAL_SKIPPED`, if that is set, which `.ci/run` prints at its end. With `MEDIAL_REQUIRE_MESHES=1`
 //! a missing mesh is a failure.
 
@@ -51,7 +51,7 @@ pub fn surfaces() -> Vec<PathBuf> {
     files
 }
 
-/// The folder of shared medial meshes, beside that of the surfaces; `None` with a notice where it is missing.
+/// The folder of shared medial meshes, next to that of the surfaces; `None` with a notice where it is missing.
 ///
 /// # Panics
 /// If it is missing and required.
@@ -96,8 +96,8 @@ pub fn has_numpy() -> bool {
     has_numpy
 }
 
-/// Says that the test that runs, or a part of it, is skipped, and why.
-#[allow(clippy::print_stderr, reason = "that is how it is said")]
+/// Reports that the running test, or a part of it, is skipped, and why.
+#[allow(clippy::print_stderr, reason = "the notice of a skipped test")]
 pub fn skip(why: &str) {
     // The harness names the thread of each test after it.
     let test = std::thread::current().name().unwrap_or("a test").to_owned();
@@ -105,13 +105,13 @@ pub fn skip(why: &str) {
     if let Some(path) = std::env::var_os("MEDIAL_SKIPPED") {
         let file = OpenOptions::new().create(true).append(true).open(path);
         let written = file.and_then(|mut file| writeln!(file, "{test}: {why}"));
-        written.expect("the list of what was skipped can be written");
+        written.expect("the list of skipped tests can be written");
     }
 }
 
 fn folder() -> PathBuf {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/meshes");
-    std::env::var_os("MEDIAL_MESHES").map_or_else(beside, PathBuf::from)
+    let default = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/meshes");
+    std::env::var_os("MEDIAL_MESHES").map_or_else(default, PathBuf::from)
 }
 
 fn missing(path: &Path) {

@@ -1,11 +1,11 @@
-//! What to ask of a method of one's own: that it passes the conformance tests, and that it stands in the
-//! tables, the plots and the page of a comparison.
+//! Tests for a method outside this repository: it passes the conformance tests, and it appears in the tables, the
+//! plots and the page of a comparison.
 
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// Runs the command of this crate, and gives what it prints.
+/// Runs the command of this crate, and returns its output.
 fn medial(arguments: &[&str]) -> String {
     let mut command = Command::new(env!("CARGO_BIN_EXE_medial-largest"));
     let output = command.args(arguments).output().expect("the command starts");
@@ -16,14 +16,14 @@ fn medial(arguments: &[&str]) -> String {
 
 #[test]
 fn it_passes_the_conformance_tests() {
-    let said = medial(&["check", "largest-rust", "--timeout", "600"]);
-    assert!(said.contains(" 0 failed"), "{said}");
+    let output = medial(&["check", "largest-rust", "--timeout", "600"]);
+    assert!(output.contains(" 0 failed"), "{output}");
 }
 
 #[test]
 fn it_stands_beside_the_published_methods() {
     let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("largest");
-    // A comparison adds to what is in its folder.
+    // A comparison adds to the results in its folder.
     let _ = fs::remove_dir_all(&out);
     let arguments =
         ["compare", "builtin:box:8", "--methods", "largest-rust,qmat", "--spheres", "30,20"];

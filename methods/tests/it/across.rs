@@ -140,7 +140,7 @@ fn topology_is_kept_at_every_level() {
 }
 
 #[test]
-fn collapses_go_on_or_start_anew_and_end_with_the_initial_mesh() {
+fn collapses_continue_or_start_again_and_end_with_the_initial_mesh() {
     let shape = shape("capsule", 24);
     let initial = shape.initial().expect("an initial medial mesh");
     let all = initial.spheres.len();

@@ -105,7 +105,7 @@ fn axis_at(
 #[test]
 fn kept_voxels_are_within_sigma_of_a_known_axis() {
     // The axis of the continuous shape is that of its mesh for flat shapes alone. The threshold
-    // is below what the samples make of a constant field.
+    // is below the flux that the samples give a constant field.
     for id in ["box", "plate"] {
         let built_in = medial_datasets::find(id).expect("in the catalogue");
         let shape = shape_of(&built_in.mesh(built_in.default_resolution));
@@ -197,7 +197,7 @@ fn the_topology_is_kept_on_all_shapes() {
     assert_topology_is_kept(&shapes.collect::<Vec<_>>(), &lattices, &[400, 60]);
 }
 
-/// Shared meshes: three holes, and four. The start set has them too, or a warning says where not.
+/// Shared meshes: three holes, and four. The start set has them too, or a warning names the missing ones.
 #[test]
 fn homotopy_on_shared_meshes_keeps_their_loops() {
     for (name, expected) in [("threeholes.off", [1, 3, 0]), ("fertility.off", [1, 4, 0])] {
@@ -380,7 +380,7 @@ fn the_published_level_has_the_parameters_of_the_paper() {
     assert_eq!(all_of(&published), all_of(&same.expect("an angle")));
     let voxels = published.extras.get::<LatticeVoxels>().expect("voxels");
     assert!(!voxels.voxels.is_empty() && voxels.voxels.iter().all(|v| v.flux <= -0.2 + 1e-7));
-    // Nothing set: the lattice of the paper, unless memory says otherwise.
+    // Nothing set: the lattice of the paper, unless memory is too small.
     let lowered = simplified(&shape, "max_memory=60", Level::Published).expect("published");
     let warnings = &lowered.diagnostics.warnings;
     assert!(warnings.iter().any(|w| w.contains("instead of the published 369")), "{warnings:?}");
@@ -390,7 +390,7 @@ fn the_published_level_has_the_parameters_of_the_paper() {
 }
 
 #[test]
-fn what_is_dismissed_depends_on_the_rule() {
+fn dismissed_voxels_depend_on_the_rule() {
     let shape = default_shape("box");
     let dismissed = [Dismiss::Zero, Dismiss::Bias].map(|dismiss| {
         let params = AofParams { dismiss, ..AofParams::default() };
@@ -417,7 +417,7 @@ fn bad_input_is_refused_by_name() {
         ("angle=0", count, "angle = 0.0 is outside (0.0, 90.0]"),
         ("angle=-10", count, "angle = -10.0 is outside (0.0, 90.0]"),
         ("", Level::Native(0.0), "angle = 0.0 is outside (0.0, 90.0]"),
-        ("", Level::Spheres(0), "at least one sphere"),
+        ("", Level::Spheres(0), "expected at least 1"),
         ("samples=70/x", count, "such as 70/60/50"),
         ("samples=5", count, "such as 70/60/50"),
         ("samples=-50", count, "such as 70/60/50"),

@@ -1,4 +1,4 @@
-//! The chain from a surface to a filtered medial mesh: topology, and what must not change it.
+//! The chain from a surface to a filtered medial mesh: topology, and invariances.
 
 use std::sync::Arc;
 
@@ -35,7 +35,7 @@ fn rough_torus() -> TriMesh {
     add_noise(&find("torus").expect("in the catalogue").mesh(16), 2e-3, 1)
 }
 
-/// The initial mesh, and what is left of it with an angle of 70 degrees and an enclosing radius of
+/// The initial mesh, and its subset with an angle of 70 degrees and an enclosing radius of
 /// `lambda`; all in input units.
 fn results(mesh: &TriMesh, lambda: f64) -> Vec<MedialMesh> {
     // The planar Delaunay triangulation does not depend on how the cells are numbered.
@@ -73,7 +73,7 @@ fn assert_carried(mesh: &TriMesh, moved: &TriMesh, scale: f64, map: impl Fn(Vec3
     for (stage, (plain, carried)) in plain.iter().zip(&carried).enumerate() {
         let expected = by_radius(&plain.transformed(scale, &map));
         let carried = by_radius(carried);
-        assert!(expected.spheres.len() > 30, "stage {stage} tells nothing");
+        assert!(expected.spheres.len() > 30, "stage {stage} is too small to test");
         assert_eq!(expected.spheres.len(), carried.spheres.len(), "stage {stage}");
         for (a, b) in expected.spheres.iter().zip(&carried.spheres) {
             let off = a.centre.distance(b.centre).max((a.radius - b.radius).abs());

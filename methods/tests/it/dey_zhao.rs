@@ -137,7 +137,7 @@ fn a_number_of_spheres_is_the_published_result_of_fewer_samples() {
 
 const SAMPLES: usize = 90;
 
-/// What is decided by less than this is decided by rounding.
+/// Decisions within this margin depend on rounding.
 const ROUNDING: f64 = 1e-9;
 
 struct Cell {
@@ -247,12 +247,12 @@ fn umbrella<'t>(
     at_p.into_iter().filter(|t| ahead(t.ends[0]) != ahead(t.ends[1])).collect()
 }
 
-/// What is asked of an edge: either condition suffices.
+/// The test of an edge: either condition suffices.
 #[derive(Clone, Copy)]
 struct Rule {
     /// An angle with every normal of less than this.
     angle: Option<f64>,
-    /// More than so many circumradii of every triangle.
+    /// Longer than this number of circumradii of every triangle.
     ratio: Option<f64>,
 }
 
@@ -317,7 +317,7 @@ fn expected(shape: &Shape, rules: &[Rule]) -> Vec<(Vec<Vec3>, usize)> {
     found.into_iter().map(|(kept, faces)| (centres(kept), faces)).collect()
 }
 
-/// Parameters, and what they say.
+/// Parameters, and their meaning.
 fn rules() -> [(Vec<(&'static str, &'static str)>, Rule); 4] {
     let angle = Some(FRAC_PI_2 - FRAC_PI_8);
     [

@@ -134,7 +134,7 @@ fn a_grid_separates_right_angles_and_straight_ones_exactly() {
 }
 
 #[test]
-fn lambda_keeps_what_its_table_says_on_a_box_and_a_plate() {
+fn lambda_keeps_the_facets_of_its_table_on_a_box_and_a_plate() {
     for id in ["box", "plate"] {
         let shape = default_shape(id);
         let (cuboid, h) = (Cuboid::of(&shape), spacing(&shape));
@@ -188,8 +188,8 @@ fn lambda_grows_from_facets_to_edges_to_vertices() {
 #[test]
 fn lambda_cells_are_nested_and_leftovers_come_on_top() {
     let shape = default_shape("capsule");
-    let asked = [0.01, 0.03, 0.06, 0.1, 0.14].map(Level::Native);
-    let [with, without] = LAMBDA.map(|set| levels(&shape, "lambda", set, &asked));
+    let wanted = [0.01, 0.03, 0.06, 0.1, 0.14].map(Level::Native);
+    let [with, without] = LAMBDA.map(|set| levels(&shape, "lambda", set, &wanted));
     let meshes = |all: Vec<Result<Simplified, SimplifyError>>| -> Vec<MedialMesh> {
         all.into_iter().map(|level| level.expect("in range").mesh).collect()
     };
@@ -215,9 +215,9 @@ fn sheets_go_without_a_change_of_topology() {
         let shape = default_shape(id);
         let initial = shape.voronoi().expect("a mesh");
         let expected = betti(&initial);
-        let asked = [0.0, 30.0, 60.0, 91.0, 120.0, 150.0, 180.0].map(Level::Native);
+        let wanted = [0.0, 30.0, 60.0, 91.0, 120.0, 150.0, 180.0].map(Level::Native);
         let mut last = initial.spheres.len();
-        for (level, theta) in levels(&shape, "angle", ANGLE[3], &asked).into_iter().zip(asked) {
+        for (level, theta) in levels(&shape, "angle", ANGLE[3], &wanted).into_iter().zip(wanted) {
             let mesh = level.expect("in range").mesh;
             mesh.check().expect("valid");
             assert_eq!(betti(&mesh), expected, "{id} {theta}");
@@ -236,7 +236,7 @@ fn sheets_go_without_a_change_of_topology() {
 }
 
 #[test]
-fn what_is_kept_of_the_tied_is_spread_over_the_shape() {
+fn kept_items_among_ties_are_spread_over_the_shape() {
     // All facets of the middle sheet tie, and cut by their numbers they would be one end of it.
     let shape = default_shape("plate");
     let cuboid = Cuboid::of(&shape);
@@ -271,16 +271,16 @@ fn variants_of_voronoi_facets_refuse_a_given_mesh() {
 }
 
 // ----------------------------------------------------------------------------
-// Which levels the variants of the angle filter and of the lambda-medial axis answer, and by what they meet a
+// The levels that the variants of the angle filter and of the lambda-medial axis support, and how they meet a
 // number of spheres.
 
 #[test]
-fn counts_are_met_from_below_or_it_is_said() {
+fn counts_are_met_from_below_or_with_a_warning() {
     let shape = default_shape("bracket");
     let all = ANGLE.iter().map(|set| ("angle", *set)).chain(LAMBDA.map(|set| ("lambda", set)));
     for (method, set) in all {
-        let asked = [600, 100, 20].map(Level::Spheres);
-        for (found, count) in levels(&shape, method, set, &asked).into_iter().zip([600, 100, 20]) {
+        let wanted = [600, 100, 20].map(Level::Spheres);
+        for (found, count) in levels(&shape, method, set, &wanted).into_iter().zip([600, 100, 20]) {
             let found = found.expect("a count");
             let reached = found.mesh.spheres.len();
             assert!(reached > 0 && (reached == count || !found.diagnostics.warnings.is_empty()));
@@ -300,10 +300,10 @@ fn the_published_level_is_announced_and_is_a_native_one() {
     for (method, set) in all.chain([("angle", [].as_slice()), ("lambda", &[])]) {
         let published =
             levels(&shape, method, set, &[Level::Published]).remove(0).expect("a level");
-        let said = &published.diagnostics.warnings;
-        assert!(said.iter().any(|w| w.starts_with("no single level is published; this is ")));
+        let warnings = &published.diagnostics.warnings;
+        assert!(warnings.iter().any(|w| w.starts_with("no single level is published; this is ")));
         assert!(!published.mesh.spheres.is_empty(), "{method} {set:?}");
-        let native = Level::Native(published.native_level.expect("a level of its own"));
+        let native = Level::Native(published.native_level.expect("a native level"));
         assert_eq!(published.mesh, at(&shape, method, set, native), "{method} {set:?}");
     }
     let lambda = levels(&shape, "lambda", &[], &[Level::Published]).remove(0).expect("a level");

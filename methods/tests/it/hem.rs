@@ -22,7 +22,7 @@ fn spheres(simplification: &mut dyn Simplification, count: usize) -> Simplified 
     simplification.at(Level::Spheres(count)).expect("a count")
 }
 
-/// The samples of the initial mesh, of which the bound speaks.
+/// The samples of the initial mesh, to which the bound applies.
 fn touched(initial: &MedialMesh) -> Vec<Vec3> {
     let contacts = initial.contacts.as_ref().expect("the Voronoi medial mesh has contacts");
     let mut ids = contacts.of_sphere.as_flattened().to_vec();
@@ -119,7 +119,7 @@ fn a_two_sided_bound_holds_for_the_boundary_of_the_union_too() {
         }
     }
     assert!(held >= 3, "{held}");
-    assert!(missed > 0, "the one-sided bound says nothing of the other direction");
+    assert!(missed > 0, "the one-sided bound does not cover the other direction");
 }
 
 /// The authors' condition sees holes that close, and no voids.
@@ -138,9 +138,9 @@ fn common_neighbours_block_holes_alone() {
 
 /// Going on after collapses were taken back for a bound is going on from the state before that.
 #[test]
-fn levels_of_either_kind_do_not_depend_on_what_was_asked_before() {
+fn levels_of_either_kind_do_not_depend_on_earlier_requests() {
     let shape = shape("bracket", 9);
-    let asked = [
+    let requested = [
         Level::Native(0.01),
         Level::Spheres(40),
         Level::Native(0.02),
@@ -149,7 +149,7 @@ fn levels_of_either_kind_do_not_depend_on_what_was_asked_before() {
         Level::Spheres(400),
     ];
     let mut continued = prepare(&shape, "surface");
-    for level in asked {
+    for level in requested {
         let here = continued.at(level).expect("a level");
         let alone = prepare(&shape, "surface").at(level).expect("a level");
         assert_eq!(here.mesh, alone.mesh, "{level}");

@@ -1,4 +1,4 @@
-//! PMAT on the medial meshes of sampled solids, and what a hierarchy is good for.
+//! PMAT on the medial meshes of sampled solids, and uses of a hierarchy.
 
 use std::sync::Arc;
 

@@ -19,7 +19,7 @@ fn spheres(simplification: &mut dyn Simplification, count: usize) -> Simplified 
 
 /// The default on every built-in shape whose initial mesh has the topology of the solid.
 #[test]
-fn by_default_what_the_initial_mesh_has_is_kept_on_every_built_in_shape() {
+fn the_topology_of_the_initial_mesh_is_kept_on_every_built_in_shape() {
     let mut tested = 0;
     for built_in in medial_datasets::catalogue() {
         let shape = shape(built_in.id, built_in.default_resolution);
@@ -37,7 +37,7 @@ fn by_default_what_the_initial_mesh_has_is_kept_on_every_built_in_shape() {
     assert!(tested >= 10, "{tested}");
 }
 
-/// What is published checks from 200 spheres on, and only there does that decide.
+/// The published level checks topology from 200 spheres on, and no other level does.
 #[test]
 fn the_published_level_checks_from_200_spheres_on() {
     let shape = default_shape("frame");
@@ -47,9 +47,9 @@ fn the_published_level_checks_from_200_spheres_on() {
     let published = at(&[], Level::Published);
     assert_eq!(published, at(&[("topology_from", "200")], Level::Spheres(100)));
     assert_eq!(at(&[], Level::Spheres(100)), at(&[("topology_from", "all")], Level::Spheres(100)));
-    let told = at(&[("topology_from", "all")], Level::Published);
-    assert_eq!(told, at(&[], Level::Spheres(100)));
-    // Going from one to the other starts anew.
+    let checked = at(&[("topology_from", "all")], Level::Published);
+    assert_eq!(checked, at(&[], Level::Spheres(100)));
+    // A change of level kind starts again.
     let mut both = prepare(&shape, &[]);
     assert_eq!(spheres(both.as_mut(), 300).mesh, at(&[], Level::Spheres(300)));
     let after = both.at(Level::Published).expect("a level");

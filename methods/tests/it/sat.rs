@@ -1,4 +1,4 @@
-//! SAT on sampled solids: what scale 1 leaves, the scale at which a gap closes, real meshes.
+//! SAT on sampled solids: the result of scale 1, the scale at which a gap closes, real meshes.
 
 use std::f64::consts::{PI, TAU};
 
@@ -56,7 +56,7 @@ fn scale_one_has_the_topology_of_the_solid() {
 }
 
 #[test]
-fn a_torn_result_is_said_to_be_torn() {
+fn a_torn_result_has_a_warning() {
     let shape = default_shape("box");
     let pure = [("radius_factor", "1"), ("jitter", "0")];
     let result = at(&shape, &pure, Level::Native(1.0));

@@ -168,30 +168,30 @@ fn counts_are_met_from_either_side_and_results_are_nested() {
         assert!(level >= t_v);
         (finer, t_v) = (result.mesh, level);
     }
-    // Each level on the way is the answer to what is nearer to it than to the next.
+    // Each level on the way is the result of all requests nearer to it than to the next.
     let at_each = |spheres: usize| at(&shape, &[], Level::Spheres(spheres)).mesh.spheres.len();
     let mut level = whole.spheres.len();
     for _ in 0..12 {
         let next = at_each(level - 1);
         if next >= level {
             // The next level is farther: it is met from half way on.
-            let asked = (1..level).rev().find(|&n| n % 40 == 0 && at_each(n) < level);
-            let Some(asked) = asked else { break };
-            let next = at_each(asked);
-            assert!(asked.abs_diff(next) <= level - asked, "{asked}: {next} instead of {level}");
+            let count = (1..level).rev().find(|&n| n % 40 == 0 && at_each(n) < level);
+            let Some(count) = count else { break };
+            let next = at_each(count);
+            assert!(count.abs_diff(next) <= level - count, "{count}: {next} instead of {level}");
             level = next;
         } else {
             level = next;
         }
     }
     assert!(level < whole.spheres.len());
-    // One sheet for each body is what no rule allows to go.
+    // The rules always keep one sheet for each body.
     let result = at(&shape, &[("topology", "all")], Level::Spheres(1));
     assert!(parts(&result).iter().all(|p| !p.removable));
     assert_eq!(betti(&result.mesh), betti(&whole));
 }
 
-/// Moving the balls decides ties; it does not decide what is left.
+/// Moving the balls decides ties, not the remaining parts.
 #[test]
 fn another_seed_leaves_nearly_as_many_spheres() {
     for id in ["blob", "bracket", "torus"] {
@@ -279,7 +279,7 @@ fn any_axis_can_be_pruned() {
     let given = default_shape("bracket").with_initial(&given);
     for axis in ["auto", "union", "initial"] {
         let result = at(&given, &[("axis", axis)], Level::Published);
-        assert!(!result.diagnostics.warnings.is_empty(), "it says whose volumes these are");
+        assert!(!result.diagnostics.warnings.is_empty(), "no warning on the volumes");
         let volume: f64 = parts(&result).iter().map(|p| p.volume).sum();
         assert!(volume > 0.1, "{axis}: {volume}");
     }

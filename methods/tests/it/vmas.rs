@@ -1,4 +1,4 @@
-//! VMAS on whole shapes: exact answers, what the authors' program gives, and what must change nothing.
+//! VMAS on whole shapes: exact results, results of the authors' program, and invariances.
 
 use std::f64::consts::TAU;
 
@@ -129,7 +129,7 @@ fn scale_and_rotation_change_nothing_but_scale_and_rotation() {
 }
 
 #[test]
-fn fewer_spheres_than_asked_are_said() {
+fn fewer_spheres_than_requested_have_a_warning() {
     let corner = |k: u32| Vec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
     let sides =
         [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
@@ -139,17 +139,17 @@ fn fewer_spheres_than_asked_are_said() {
         vertices: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
         faces: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
     };
-    for (text, asked, why) in [
+    for (text, requested, why) in [
         ("points=vertices", 5, "dropped"),
         ("samples=100:iterations=3", 20, "iterations"),
         ("points=vertices:iterations=1", 4, "iterations"),
     ] {
         for (name, mesh) in [("cube", &cube), ("tetrahedron", &tetrahedron)] {
-            let Simplified { mesh, diagnostics, .. } = spheres(&shape_of(mesh), text, asked);
+            let Simplified { mesh, diagnostics, .. } = spheres(&shape_of(mesh), text, requested);
             mesh.check().expect("a valid complex");
-            assert!((1..asked).contains(&mesh.spheres.len()), "{name} {text}");
-            let said = diagnostics.warnings.iter().any(|warning| warning.contains(why));
-            assert!(said, "{name} {text}: {:?}", diagnostics.warnings);
+            assert!((1..requested).contains(&mesh.spheres.len()), "{name} {text}");
+            let is_warned = diagnostics.warnings.iter().any(|warning| warning.contains(why));
+            assert!(is_warned, "{name} {text}: {:?}", diagnostics.warnings);
         }
     }
 }

@@ -1,5 +1,4 @@
-//! The page in a browser, from disk and without a network: no error, no request, and the answers of
-//! `page_checks.txt`.
+//! Runs the checks of `page_checks.txt` in a browser, from disk and without a network: no error, no request.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -16,20 +15,20 @@ use medial_reports::{Record, View3d, picture_strips, write_report};
 use serde_json::{Value, json};
 
 const BROWSER: &str = "chromium";
-/// More rows than stand in the document at first.
+/// More rows than the document has at first.
 const METHODS: [&str; 6] = ["qmat", "angle", "lambda", "sat", "hem", "pmat"];
 const COUNTS: [usize; 4] = [1000, 500, 200, 100];
-/// What takes longer has failed.
+/// Limit of each wait.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A browser without a window, told what to do through a pipe by its DevTools protocol.
+/// A browser without a window, controlled through a pipe by its DevTools protocol.
 struct Browser {
     child: Child,
     to: ChildStdin,
     from: Receiver<Value>,
     last: u64,
     session: Option<String>,
-    /// What it said without being asked.
+    /// Its events.
     events: Vec<Value>,
 }
 
@@ -41,7 +40,7 @@ impl Browser {
             medial_test_support::skip("no chromium");
             return None;
         }
-        // The protocol speaks on the descriptors 3 and 4.
+        // The protocol uses the descriptors 3 and 4.
         let redirected = "exec \"$@\" 3<&0 4>&1 </dev/null >/dev/null 2>/dev/null";
         let mut child = Command::new("sh")
             .args(["-c", redirected, "sh", BROWSER, "--headless", "--no-sandbox", "--disable-gpu"])
@@ -114,7 +113,7 @@ impl Browser {
         answer["result"]["value"].clone()
     }
 
-    /// Waits for what must become true.
+    /// Waits until a condition holds.
     fn until(&mut self, expression: &str) {
         let start = Instant::now();
         while self.value(expression) != true {
@@ -128,7 +127,7 @@ impl Browser {
         self.until(
             "location.protocol === 'file:' && 'ready' in (document.documentElement?.dataset ?? {})",
         );
-        // What moves on its own moves from under the mouse.
+        // Animated elements would move from under the mouse.
         self.value("document.documentElement.style.scrollBehavior = 'auto'");
     }
 
@@ -162,7 +161,7 @@ impl Browser {
         }
     }
 
-    /// Takes steps: each line is a word and what it is about, as the head of the file says.
+    /// Takes steps: each line is a word and its argument, as the head of the file defines.
     fn run(&mut self, steps: &str) {
         for (number, line) in steps.lines().enumerate() {
             let Some((word, what)) = line.split_once(' ').filter(|_| !line.starts_with('#')) else {
@@ -220,7 +219,7 @@ fn write_views(folder: &Path, records: &[Record]) {
 }
 
 #[test]
-fn the_page_answers_from_disk() {
+fn the_page_works_from_disk() {
     let folder = tempfile::tempdir().unwrap();
     let profile = tempfile::tempdir().unwrap();
     let Some(mut browser) = Browser::start(profile.path()) else { return };
@@ -236,7 +235,7 @@ fn the_page_answers_from_disk() {
         match event["method"].as_str().unwrap_or_default() {
             "Network.requestWillBeSent" => {
                 let url = params["request"]["url"].as_str().unwrap();
-                // Scripts that the page makes of its own text are no request.
+                // Scripts made from the page's text are no requests.
                 assert!(url.starts_with("file:") || url.starts_with("blob:"), "{url}");
                 requests += usize::from(url.starts_with("file:"));
             }

@@ -57,7 +57,7 @@ pub fn ok(mesh: &str, method: &str, count: usize, shape: usize, rank: usize) -> 
     );
     let genus = if shape.is_multiple_of(4) { 3 } else { 0 };
     let right = rank == 0 || noise(shape, rank, 99) > 0.4;
-    let mut record = asked(mesh, method, count, Status::Ok);
+    let mut record = request(mesh, method, count, Status::Ok);
     record.simplify.reached = Some(count);
     record.simplify.spheres = Some(count);
     record.simplify.edges = Some(count * 5 / 2);
@@ -154,7 +154,7 @@ fn evaluation(error: f64, wobble: f64, count: usize, rank: usize) -> Evaluation 
 }
 
 /// The record of a run that led to nothing.
-pub fn asked(mesh: &str, method: &str, count: usize, status: Status) -> Record {
+pub fn request(mesh: &str, method: &str, count: usize, status: Status) -> Record {
     let mut simplify = Simplify::asked(method, Target::Spheres(count), status);
     simplify.seed = 1;
     simplify.threads = Some(1);
@@ -180,7 +180,7 @@ pub fn asked(mesh: &str, method: &str, count: usize, status: Status) -> Record {
 
 /// The same with a reason.
 pub fn failed(mesh: &str, method: &str, count: usize, status: Status, reason: &str) -> Record {
-    Record { reason: Some(reason.to_owned()), ..asked(mesh, method, count, status) }
+    Record { reason: Some(reason.to_owned()), ..request(mesh, method, count, status) }
 }
 
 /// A header for made-up records.
@@ -214,7 +214,7 @@ pub fn comparison(shapes: &[&str], methods: &[&str], counts: &[usize]) -> Vec<Re
                 records.push(match (shape % 13, rank, count) {
                     (3, 1, 100) => failed(mesh, method, count, Status::Panicked, "index out of bounds: the len is 0 but the index is 4"),
                     (5, 2, _) => failed(mesh, method, count, Status::TimedOut, "no result within 300 s"),
-                    (8, 1, _) => failed(mesh, method, count, Status::Unsupported, "unsupported: the parts of this shape cannot be told apart; use the published level"),
+                    (8, 1, _) => failed(mesh, method, count, Status::Unsupported, "unsupported: the parts of this shape cannot be separated; use the published level"),
                     _ => ok(mesh, method, count, shape, rank),
                 });
             }

@@ -1,4 +1,4 @@
-//! The difference of two sets of records: what is alarmed, what is listed, and what is left alone.
+//! The difference of two sets of records: regressions, listed changes, ignored noise.
 
 use medial_reports::diff::{Diff, DiffOptions, Meaning};
 use medial_reports::{Record, Repetition, Stages};
@@ -36,7 +36,7 @@ fn timed(seed: usize, noise: f64, factor: impl Fn(&Record) -> f64) -> Vec<Record
 }
 
 #[test]
-fn equal_records_are_silent_and_noise_is_no_regression() {
+fn equal_records_and_noise_are_no_regression() {
     for seed in 0..20 {
         let diff = diff(&timed(seed, 0.1, |_| 1.0), &timed(seed + 100, 0.1, |_| 1.0));
         assert_eq!(diff.count(Meaning::Regression), 0, "seed {seed}: {}", diff.to_markdown());
@@ -68,7 +68,7 @@ fn busy(seed: usize, repetitions: usize, factor: f64) -> Vec<Record> {
 }
 
 #[test]
-fn a_busy_machine_is_no_regression_and_a_slow_build_is_one_nevertheless() {
+fn a_slow_build_is_a_regression_and_a_busy_machine_is_not() {
     let silent = |alternating| {
         let options = DiffOptions { alternating, ..DiffOptions::default() };
         let names = || ["before".to_owned(), "after".to_owned()];
@@ -88,14 +88,14 @@ fn a_busy_machine_is_no_regression_and_a_slow_build_is_one_nevertheless() {
 }
 
 #[test]
-fn a_slower_method_is_named_alone() {
+fn only_the_slower_method_is_reported() {
     let slower = |record: &Record| if record.simplify.method == "angle" { 1.15 } else { 1.0 };
     for seed in 0..20 {
         let diff = diff(&timed(seed, 0.1, |_| 1.0), &timed(seed + 100, 0.1, slower));
-        let told = diff.timings.iter().filter(|timing| timing.meaning.is_some());
-        let told: Vec<_> = told.map(|t| (t.method.as_str(), t.meaning)).collect();
-        assert!(told.contains(&("angle", Some(Meaning::Regression))), "seed {seed}: {told:?}");
-        assert!(told.iter().all(|(method, _)| *method == "angle"), "seed {seed}: {told:?}");
+        let found = diff.timings.iter().filter(|timing| timing.meaning.is_some());
+        let found: Vec<_> = found.map(|t| (t.method.as_str(), t.meaning)).collect();
+        assert!(found.contains(&("angle", Some(Meaning::Regression))), "seed {seed}: {found:?}");
+        assert!(found.iter().all(|(method, _)| *method == "angle"), "seed {seed}: {found:?}");
         // The clock on the wall is shown, and is no gate.
         let wall: Vec<_> = diff.timings.iter().filter(|timing| timing.clock == "wall").collect();
         assert!(!wall.is_empty() && wall.iter().all(|timing| timing.meaning.is_none()));
@@ -106,29 +106,29 @@ fn a_slower_method_is_named_alone() {
 }
 
 #[test]
-fn a_slower_mesh_is_named_where_the_method_on_the_whole_is_not() {
+fn a_slower_mesh_is_reported_without_its_method() {
     let slower = |record: &Record| {
         let is_it = record.simplify.method == "qmat" && record.mesh == SHAPES[2];
         if is_it { 1.18 } else { 1.0 }
     };
     let diff = diff(&timed(1, 0.02, |_| 1.0), &timed(2, 0.02, slower));
-    let told: Vec<_> = (diff.timings.iter())
+    let found: Vec<_> = (diff.timings.iter())
         .filter(|timing| timing.meaning.is_some())
         .map(|timing| (timing.method.as_str(), timing.mesh.as_deref()))
         .collect();
-    assert_eq!(told, [("qmat", Some(SHAPES[2]))]);
+    assert_eq!(found, [("qmat", Some(SHAPES[2]))]);
 }
 
 #[test]
-fn exact_quantities_alarm_at_once_and_by_name() {
+fn changes_of_exact_quantities_are_reported_by_name() {
     let old = comparison(&SHAPES[..4], &METHODS, &[500, 100]);
     let changed = |change: &dyn Fn(&mut Record)| {
         let mut new = old.clone();
         let one = new.iter_mut().rfind(|r| r.status.is_ok() && r.simplify.method == "qmat");
         change(one.unwrap());
         let diff = diff(&old, &new);
-        let told = diff.changes.iter().map(|c| (c.what.clone(), c.item.method.clone(), c.meaning));
-        told.collect::<Vec<_>>()
+        let found = diff.changes.iter().map(|c| (c.what.clone(), c.item.method.clone(), c.meaning));
+        found.collect::<Vec<_>>()
     };
     let one = |what: &str, meaning| vec![(what.to_owned(), "qmat".to_owned(), meaning)];
     let error = changed(&|record| {
@@ -160,20 +160,20 @@ fn exact_quantities_alarm_at_once_and_by_name() {
 }
 
 #[test]
-fn what_cannot_be_compared_is_named_with_the_reason() {
+fn incomparable_records_are_listed_with_the_reason() {
     let old = timed(1, 0.0, |_| 1.0);
     let mut new = old.clone();
     new.iter_mut().for_each(|record| record.machine.cpu = "another".into());
-    let told = diff(&old, &new);
-    assert!(told.timings.is_empty() && told.untimed[0].contains("different machines"));
-    assert!(told.compared > 20);
+    let difference = diff(&old, &new);
+    assert!(difference.timings.is_empty() && difference.untimed[0].contains("different machines"));
+    assert!(difference.compared > 20);
 
     let mut new = old.clone();
     new.iter_mut().for_each(|record| record.simplify.threads = Some(8));
-    let told = diff(&old, &new);
-    assert_eq!((told.compared, told.unlike.len()), (0, old.len()));
-    assert_eq!(told.unlike[0].why, "threads 8, 1 before");
-    assert!(told.to_markdown().starts_with("# Nothing could be compared"));
+    let difference = diff(&old, &new);
+    assert_eq!((difference.compared, difference.unlike.len()), (0, old.len()));
+    assert_eq!(difference.unlike[0].why, "threads 8, 1 before");
+    assert!(difference.to_markdown().starts_with("# Nothing could be compared"));
 
     let mut known = old.clone();
     known[0].mesh_hash = Some("00".repeat(32));
@@ -183,11 +183,11 @@ fn what_cannot_be_compared_is_named_with_the_reason() {
     assert_eq!(why, "the mesh has other content: ffffffffffff, 000000000000 before");
 
     let once = comparison(&SHAPES[..4], &METHODS, &[500, 100]);
-    let told = diff(&once, &once);
-    assert!(told.untimed[0].contains("fewer than 5 repetitions"), "{:?}", told.untimed);
+    let difference = diff(&once, &once);
+    assert!(difference.untimed[0].contains("fewer than 5 repetitions"), "{:?}", difference.untimed);
 
-    let told = diff(&old, &old[1..]);
-    assert_eq!((told.missing.len(), told.count(Meaning::Regression)), (1, 0));
-    assert!(told.to_markdown().contains("only in the older"));
+    let difference = diff(&old, &old[1..]);
+    assert_eq!((difference.missing.len(), difference.count(Meaning::Regression)), (1, 0));
+    assert!(difference.to_markdown().contains("only in the older"));
     assert_eq!(diff(&old[1..], &old).added.len(), 1);
 }

@@ -1,4 +1,4 @@
-//! Histories of made-up runs: their files, and what is found in them.
+//! Histories of made-up runs: their files and findings.
 
 use std::fs;
 
@@ -55,7 +55,7 @@ fn runs_are_stored_once_and_read_back_in_order() {
             *record = failed("box", "hem", 500, Status::TimedOut, "no result within 300 s");
         }
     });
-    // The second run of a day sorts by its time, whatever its commit.
+    // The second run of a day sorts by its time, for any commit.
     runs[2].date = date(1).replace("02:15", "01:15");
     for run in &runs {
         assert!(run.add_to(folder.path()).expect("added").1);
@@ -92,7 +92,7 @@ fn runs_are_stored_once_and_read_back_in_order() {
 
 #[cfg(unix)]
 #[test]
-fn a_pipe_among_the_files_is_left_out_unread() {
+fn pipes_are_skipped_without_reading() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = &runs(1, |_, _, _| {})[0];
     run.add_to(folder.path()).expect("added");
@@ -106,7 +106,7 @@ fn a_pipe_among_the_files_is_left_out_unread() {
 }
 
 #[test]
-fn records_of_more_than_one_run_are_refused() {
+fn records_of_more_than_one_run_are_rejected() {
     let refused = |records: &[Record], commit: &str, date: &str| {
         Run::of_records(records, commit, date).expect_err("refused").to_string()
     };
@@ -130,7 +130,7 @@ fn records_of_more_than_one_run_are_refused() {
 }
 
 #[test]
-fn a_step_is_reported_with_its_commits_and_is_news_once() {
+fn a_change_point_is_reported_once_with_its_commits() {
     let runs = runs(60, |run, record, seconds| {
         if run >= 30 && record.simplify.method == "pmat" && record.mesh == "box" {
             *seconds *= 1.2;
@@ -156,7 +156,7 @@ fn a_step_is_reported_with_its_commits_and_is_news_once() {
 }
 
 #[test]
-fn a_step_of_most_series_is_the_machine() {
+fn a_step_of_most_series_is_attributed_to_the_machine() {
     let runs = runs(50, |run, record, seconds| {
         *seconds *= if run >= 30 { 1.15 } else { 1.0 };
         // Beyond that, one method is slower by itself.
@@ -175,7 +175,7 @@ fn a_step_of_most_series_is_the_machine() {
 }
 
 #[test]
-fn exact_values_change_at_once() {
+fn exact_values_change_after_one_run() {
     let runs = runs(10, |run, record, _| {
         if run >= 9 && record.simplify.method == "qmat" && record.mesh == "bear" {
             record.result_hash = Some("f".repeat(64));
@@ -201,7 +201,7 @@ fn exact_values_change_at_once() {
 }
 
 #[test]
-fn machines_that_take_turns_are_compared_with_themselves() {
+fn alternating_machines_are_compared_separately() {
     let runs = runs(80, |run, record, seconds| {
         if run.is_multiple_of(3) {
             record.machine.cpu = "Another".to_owned();

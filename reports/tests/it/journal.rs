@@ -1,8 +1,8 @@
-//! `results.jsonl`: what was written reads back, and an interrupted write costs one line.
+//! `results.jsonl`: written records read back, and an interrupted write costs one line.
 
 use std::fs;
 
-use super::common::{asked, comparison, ok};
+use super::common::{comparison, ok, request};
 use medial_reports::{Journal, JournalError, Status, read_records, write_records};
 use proptest::prelude::*;
 
@@ -20,7 +20,7 @@ fn records_read_back_bit_for_bit() {
 }
 
 #[test]
-fn a_number_that_json_cannot_carry_is_refused_and_nothing_is_written() {
+fn numbers_without_a_json_form_are_rejected_and_not_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("results.jsonl");
     let mut journal = Journal::open(&path).unwrap();
@@ -36,21 +36,21 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     /// Wherever a crash cuts the file off, complete lines survive, the torn one is reported, and
-    /// the next record has a line of its own.
+    /// the next record has its own line.
     #[test]
     fn a_torn_line_costs_one_record(cut in 0.0..1.0f64) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("results.jsonl");
         let records: Vec<_> =
-            [300, 200, 100].map(|count| asked("bear", "qmat", count, Status::Failed)).into();
+            [300, 200, 100].map(|count| request("bear", "qmat", count, Status::Failed)).into();
         write_records(&path, &records).unwrap();
         let bytes = fs::read(&path).unwrap();
-        let kept = &bytes[..(cut * bytes.len() as f64) as usize];
-        fs::write(&path, kept).unwrap();
+        let remaining = &bytes[..(cut * bytes.len() as f64) as usize];
+        fs::write(&path, remaining).unwrap();
         // A line that lacks only its line break is complete.
         let ends: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i] == b'\n').collect();
-        let complete = ends.iter().filter(|&&end| end <= kept.len()).count();
-        let torn = !kept.is_empty() && kept.last() != Some(&b'\n') && !ends.contains(&kept.len());
+        let complete = ends.iter().filter(|&&end| end <= remaining.len()).count();
+        let torn = !remaining.is_empty() && remaining.last() != Some(&b'\n') && !ends.contains(&remaining.len());
 
         let read = read_records(&path).unwrap();
         prop_assert_eq!(&read.records[..], &records[..complete]);

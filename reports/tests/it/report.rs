@@ -1,4 +1,4 @@
-//! A report as a whole: what is in the folder, what the numbers in it are, what cannot spoil it.
+//! A report as a whole: its files, its numbers, its protection against hostile names.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -34,7 +34,7 @@ fn report_of(records: &[Record]) -> BTreeMap<String, Vec<u8>> {
     let folder = tempfile::tempdir().unwrap();
     let written = write_report(folder.path(), records, &header(&METHODS)).unwrap();
     let all = files(folder.path());
-    assert_eq!(written.len(), all.len(), "what is there is what is said to be written");
+    assert_eq!(written.len(), all.len(), "write_report returns every file of the folder");
     assert_eq!(written.last(), Some(&folder.path().join("index.html")));
     all
 }
@@ -62,7 +62,7 @@ fn the_same_records_give_the_same_bytes() {
 }
 
 #[test]
-fn seconds_that_other_items_disturbed_are_in_no_table() {
+fn disturbed_seconds_are_excluded_from_tables() {
     let alone = comparison(&SHAPES[..2], &METHODS, &COUNTS);
     let mut disturbed = alone.clone();
     for record in &mut disturbed {
@@ -138,7 +138,7 @@ fn no_method_gains_by_failing() {
         let mut rows = summary.lines().filter(|line| line.contains(&format!("| {method} |")));
         rows.next().unwrap_or_else(|| panic!("{method}: {summary}")).to_owned()
     };
-    // Equal where both have a result, and that is said; its mean over fewer meshes is marked.
+    // Equal where both have a result, as the ratio shows; its mean over fewer meshes is marked.
     assert!(row("angle").contains("| 1.00 | 1 mesh |"), "{}", row("angle"));
     assert!(row("angle").contains("(1.23)") && row("angle").contains("1 of 2"));
     assert!(row("qmat").contains("7.84") && row("qmat").contains("2 of 2"));
@@ -146,7 +146,7 @@ fn no_method_gains_by_failing() {
     assert!(bulk["columns"]["item/reason"].to_string().contains("index out of bounds"));
 }
 
-/// What the summary says of a method, without the marks of the best.
+/// A method's row of the summary, without the marks of the best.
 fn summary_rows(records: &[Record], method: &str) -> Vec<String> {
     let files = report_of(records);
     let rows = text(&files, "tables/summary.md").lines();
@@ -194,9 +194,9 @@ fn a_curve_is_over_one_set_of_meshes() {
     assert!(rows[0].contains("| 2 of 3 |") && rows[1].contains("| 2 of 3 |"), "{rows:?}");
 }
 
-/// A result without a triangle has no angle: the mean angle is over the others, and says how many.
+/// A result without a triangle has no angle: the mean angle is over the others, with their number.
 #[test]
-fn what_some_results_do_not_have_is_averaged_over_the_others() {
+fn missing_values_are_excluded_from_means() {
     let mut records = vec![];
     for (shape, mesh) in SHAPES[..4].iter().enumerate() {
         for count in [500, 100] {
@@ -219,7 +219,7 @@ fn what_some_results_do_not_have_is_averaged_over_the_others() {
 }
 
 #[test]
-fn bounds_and_own_levels_have_tables_of_their_own() {
+fn error_bounds_and_native_levels_have_separate_tables() {
     use medial_reports::Target;
 
     let mut records = Vec::new();
@@ -256,7 +256,7 @@ fn bounds_and_own_levels_have_tables_of_their_own() {
 }
 
 #[test]
-fn names_from_files_stay_text() {
+fn names_from_files_are_escaped() {
     let hostile = "<script>alert(1)</script>|a\\b_c%&/../x";
     let mut record = ok(hostile, "qmat", 100, 0, 0);
     record.simplify.warnings.push("</script><img src=x onerror=alert(2)>".to_owned());
@@ -276,7 +276,7 @@ fn names_from_files_stay_text() {
 }
 
 #[test]
-fn a_spreadsheet_finds_no_formula_in_the_csv() {
+fn csv_cells_are_never_formulas() {
     let record = ok("=HYPERLINK(0)", "qmat", 100, 0, 0);
     let mut refused = failed("@bear", "qmat", 100, Status::Refused, "-1 faces");
     refused.command = "+medial".to_owned();
@@ -296,7 +296,7 @@ fn a_spreadsheet_finds_no_formula_in_the_csv() {
 }
 
 #[test]
-fn numbers_of_an_earlier_report_do_not_stay() {
+fn files_of_an_earlier_report_are_removed() {
     let folder = tempfile::tempdir().unwrap();
     let write = |records: &[Record]| write_report(folder.path(), records, &header(&METHODS));
     write(&[ok("bear", "qmat", 100, 0, 0), ok("plane", "qmat", 100, 1, 0)]).unwrap();
@@ -312,7 +312,7 @@ fn numbers_of_an_earlier_report_do_not_stay() {
 }
 
 #[test]
-fn nothing_measured_is_said() {
+fn a_page_without_measurements_has_a_notice() {
     let records = [failed("bear", "qmat", 100, Status::TimedOut, "no result within 300 s")];
     let alert = |records: &[Record]| {
         let [report, _] = documents(text(&report_of(records), "index.html"));
@@ -370,7 +370,7 @@ fn means_over_fewer_meshes_are_in_parentheses() {
 }
 
 #[test]
-fn neither_the_start_nor_an_error_above_5_percent_answers_a_question() {
+fn the_initial_mesh_and_errors_above_5_percent_are_not_ranked() {
     let mut records = vec![];
     for (shape, mesh) in SHAPES[..2].iter().enumerate() {
         records.push(with_error(ok(mesh, "initial", 100, shape, 0), 0.001));
@@ -413,7 +413,7 @@ fn an_error_that_rises_with_the_count_is_marked() {
 }
 
 #[test]
-fn methods_that_did_not_run_are_named_with_a_command_and_missing_ones_are_not() {
+fn methods_that_did_not_run_are_listed_with_a_command() {
     let folder = tempfile::tempdir().unwrap();
     let records = comparison(&SHAPES[..2], &["qmat"], &COUNTS);
     let page = |head: &Header| {
@@ -442,7 +442,7 @@ fn methods_that_did_not_run_are_named_with_a_command_and_missing_ones_are_not() 
 }
 
 #[test]
-fn captions_have_the_recorded_error_and_the_most_telling_mesh_comes_first() {
+fn captions_have_the_recorded_error_and_the_mesh_with_the_largest_spread_leads() {
     let mut records = vec![];
     // Methods differ most on the third one, which one of them did not run on.
     for (mesh, errors) in [("a", [0.01, 0.012]), ("b", [0.04, 0.01]), ("c", [0.2, 0.001])] {
@@ -472,7 +472,7 @@ fn captions_have_the_recorded_error_and_the_most_telling_mesh_comes_first() {
 }
 
 #[test]
-fn the_answers_name_the_lead_and_a_weak_method_changes_none_of_them() {
+fn a_weak_method_changes_no_row_of_which_method() {
     let records = comparison(&SHAPES[..4], &METHODS, &COUNTS);
     let before = report_of(&records);
     let name = "tables/overview-purpose.md";
@@ -500,7 +500,7 @@ fn the_answers_name_the_lead_and_a_weak_method_changes_none_of_them() {
     });
     assert!(before_rows.len() == 8, "{table}");
     assert_eq!(before_rows, after_rows);
-    // The rows of other methods in the table of means stay; only those of its own are added.
+    // The rows of other methods in the table of means stay; only its own rows are added.
     let [before, after] = [&before, &after].map(|files| text(files, "tables/summary.md"));
     for line in before.lines().filter(|line| line.starts_with('|')) {
         assert!(after.lines().any(|other| other == line), "{line}");
@@ -510,7 +510,7 @@ fn the_answers_name_the_lead_and_a_weak_method_changes_none_of_them() {
 #[test]
 fn the_bibliography_has_each_method_that_ran_once() {
     let mut records = comparison(&SHAPES[..2], &["qmat", "angle"], &[100]);
-    // A row of its own with the entry of another.
+    // A separate row with the entry of another.
     let mut variant = ok("bear", "qmat", 100, 0, 0);
     variant.simplify.params.set("k", "0");
     records.push(variant);

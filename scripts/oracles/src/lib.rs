@@ -5,7 +5,7 @@ use std::error::Error;
 use medial::Vec3;
 use medial::surface::TriMesh;
 
-/// A mesh and the points to ask about, three kinds of as many each.
+/// A mesh and the query points, three kinds of as many each.
 ///
 /// In a file: the counts of vertices, faces and queries of one kind (u64), vertices (3 f64), faces (3 u32), the three
 /// kinds of queries (3 f64).
@@ -51,8 +51,8 @@ impl Task {
             vertices: points(&numbers(&rest[..ends[0]])),
             faces: ids.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
         };
-        let asked = points(&numbers(&rest[ends[1]..]));
-        let queries = [0, 1, 2].map(|kind| asked[kind * queries..(kind + 1) * queries].to_vec());
+        let all = points(&numbers(&rest[ends[1]..]));
+        let queries = [0, 1, 2].map(|kind| all[kind * queries..(kind + 1) * queries].to_vec());
         Ok(Self { mesh, queries })
     }
 }

@@ -46,7 +46,7 @@ impl CollapseComplex {
     /// this; then the link condition holds. The result of the collapse is the same with or without
     /// the added simplices, since their images are in the complex already.
     ///
-    /// Cost: the two links, and the square of what they share.
+    /// Cost: the two links, and the square of their intersection.
     pub fn keeps_homotopy(&mut self, a: u32, b: u32) -> bool {
         self.find_shared(a, b);
         self.unmark_roots(a, b);

@@ -423,7 +423,7 @@ pub struct Collapse {
 /// initial mesh under the composition of their simplicial maps.
 ///
 /// `replay(initial, &record[..t])` is, bit for bit, the mesh that the engine had after `t`
-/// collapses, for every `t` and in any order of asking. Cost `O(n log n)`.
+/// collapses, for every `t` and in any order of queries. Cost `O(n log n)`.
 ///
 /// # Panics
 /// If the collapses name spheres that `initial` does not have.
@@ -450,7 +450,7 @@ pub fn replay(initial: &MedialMesh, collapses: &[Collapse]) -> MedialMesh {
 }
 
 /// The images of simplices with all their vertices, each once, in order. Of a simplex whose vertices
-/// merged, the image of lower dimension is among those of its own edges.
+/// merged, the image of lower dimension is among those of its edges.
 fn mapped<const K: usize>(simplices: &[[u32; K]], image: impl Fn(u32) -> u32) -> Vec<[u32; K]> {
     let images = simplices.iter().map(|simplex| {
         let mut simplex = simplex.map(&image);
@@ -469,7 +469,7 @@ impl CollapseComplex {
     /// A face `[v, p, q]` that folds over when both ends of the edge `{a, b}` move to `centre`; `v`
     /// is the one end that belongs to the face. See [`CollapseComplex::folds`].
     ///
-    /// The answer stays valid until one of `a`, `b`, `p`, `q` is part of a collapse.
+    /// The result stays valid until one of `a`, `b`, `p`, `q` is part of a collapse.
     /// Cost: the faces of both ends.
     pub fn folded_face(&self, a: u32, b: u32, centre: Vec3) -> Option<[u32; 3]> {
         [[a, b], [b, a]].into_iter().find_map(|[moved, other]| {

@@ -76,7 +76,7 @@ impl Prioritised for Candidate {
 }
 
 /// A priority queue of candidates: smallest cost first, then the second key, then the ids.
-/// Equal contents come out in the same order whatever the history.
+/// Equal contents come out in the same order for any history.
 #[derive(Clone, Debug, Default)]
 pub struct CollapseQueue {
     heap: LazyHeap<Candidate>,
@@ -333,7 +333,7 @@ impl<T: Prioritised> LazyHeap<T> {
     }
 
     fn drop_outdated(&mut self, is_current: &impl Fn(&T) -> bool) {
-        // A group may become empty; its pivot still bounds what is pushed later.
+        // A group may become empty; its pivot still bounds later items.
         self.near.retain(is_current);
         self.heapify();
         for group in &mut self.far {
@@ -584,14 +584,14 @@ mod tests {
         assert!(queue.is_empty());
     }
 
-    /// What is out of date does not pile up.
+    /// Outdated items do not pile up.
     #[test]
     fn the_memory_is_bounded() {
         let mut queue = LazyHeap::default();
         queue.push((0, 0));
         for id in 0..1_000_000_u32 {
             assert_eq!(queue.pop(|item| item.1 == id), Some((0, id)));
-            // Far behind what is current, so that it is never popped.
+            // Far behind current items, so that it is never popped.
             (0..4).for_each(|extra| queue.push((1_000 + extra, id)));
             queue.push((0, id + 1));
             assert!(queue.len() < 3 * HEAP_SIZE, "{}", queue.len());

@@ -81,10 +81,10 @@ fn conditions_see_holes_and_voids_and_let_a_cup_be_flattened() {
     }
 }
 
-/// An edge that closes a hole may be collapsed once a vertex beside it is filled in, without any
+/// An edge that closes a hole may be collapsed once a vertex next to it is filled in, without any
 /// change at the hole's own vertices.
 #[test]
-fn an_obstacle_can_lie_beside_the_hole() {
+fn an_obstacle_can_lie_next_to_the_hole() {
     // The hole 0 1 2 with faces outwards at its sides: merging 3 and 4 makes a cup of three faces.
     let faces = [[0, 1, 3], [0, 2, 3], [1, 2, 4]];
     let mut complex = CollapseComplex::from_mesh(&mesh(5, &[[3, 4]], &faces));
@@ -95,7 +95,7 @@ fn an_obstacle_can_lie_beside_the_hole() {
     assert!(complex.keeps_homotopy(0, 1));
 }
 
-/// The weaker condition has cases of its own on random complexes, or the property test below would
+/// The weaker condition has separate cases on random complexes, or the property test below would
 /// not test it.
 #[test]
 fn the_weaker_condition_admits_more() {

@@ -166,8 +166,8 @@ fn extras(values: &SphereValues) -> Value {
     json!({
         "colour_by": values.name, "colour_meaning": values.meaning, "colour_map": values.map.name(),
         "colour_low": values.low, "colour_high": values.high,
-        "unit": "that of the input, which glTF calls a metre", "radius_attribute": RADIUS,
-        "axes": "the input's (x, y, z) stands as (x, z, -y), so that its z is up",
+        "unit": "the input's unit, which glTF calls a metre", "radius_attribute": RADIUS,
+        "axes": "the input's (x, y, z) is (x, z, -y) here, so that its z is up",
     })
 }
 
@@ -194,7 +194,7 @@ fn spheres(out: &mut Arrays, mesh: &MedialMesh, values: &SphereValues) -> Value 
     json!({ "name": "spheres", "primitives": [primitive], "extras": extras(values) })
 }
 
-/// Opaque, in the linear light that glTF asks for, in 16 bits since 8 bits of light show steps in dark colours.
+/// Opaque, in the linear light that glTF requires, in 16 bits since 8 bits of light show steps in dark colours.
 fn colour(values: &SphereValues, sphere: usize) -> [u16; 4] {
     let [r, g, b] = values.map.linear(values.place(sphere));
     [r, g, b, 1.0].map(|light| (light * f64::from(u16::MAX)).round() as u16)

@@ -34,7 +34,7 @@ use super::{LoadedMa, MaError, MaErrorKind, Radii, ReadOptions};
 use crate::Vec3;
 use crate::complex::{MedialMesh, Sphere};
 
-/// Reads a medial mesh from the text of a `.ma` file; `name` stands for the file in errors.
+/// Reads a medial mesh from the text of a `.ma` file; `name` is the file in errors.
 ///
 /// Empty lines, comments (`#`), carriage returns and any order of the lines are accepted. Edges and
 /// faces may be in any order and orientation; missing sides of faces are added. Elements that a trailing flag
@@ -55,7 +55,7 @@ use crate::complex::{MedialMesh, Sphere};
 /// When the header or a line is not as above, a number is not finite, an
 /// index is out of range, trailing words are the flags of no known tool, the lines are not as
 /// many as announced (but for edges and faces of a writer that is known to miscount them), a second medial mesh was
-/// appended, or the file has no such block; but for what the options allow.
+/// appended, or the file has no such block, unless the options allow it.
 pub fn parse_ma(
     text: impl AsRef<[u8]>,
     name: &str,
@@ -461,7 +461,7 @@ impl Records {
         }
     }
 
-    /// The medial mesh of all records; `name` stands for the file in errors.
+    /// The medial mesh of all records; `name` is the file in errors.
     fn finish(mut self, name: &str) -> Result<LoadedMa, MaError> {
         let (mut notes, mut warnings) = (Vec::new(), Vec::new());
         self.check_counts(name, &mut notes, &mut warnings)?;
@@ -500,7 +500,7 @@ impl Records {
         if self.layout != Layout::Complex {
             notes.push("a list of spheres without edges and faces".to_owned());
         }
-        // libmat counts edges and faces of its own lists instead of the lines; its flags tell its files.
+        // libmat counts edges and faces of internal lists instead of the lines; its flags identify its files.
         let with_its_flags = [self.words[SPHERE][2], self.words[EDGE][2], self.words[FACE][1]];
         let is_libmat = found[EDGE] > 0 && with_its_flags.map(|count| count as u64) == found;
         let miscounts = self.normals > 0 || is_libmat;
@@ -520,7 +520,7 @@ impl Records {
             } else if self.options.lenient {
                 warnings.push(format!("{differ}: taken as they are"));
             } else {
-                // Where the first record too many stands, the message counts up to it.
+                // At the first record too many the message counts up to it.
                 let line = self.excess[kind];
                 let found = if line.is_some() { announced + 1 } else { found };
                 let kind = MaErrorKind::Malformed(miscount(kind, announced, found));
@@ -643,8 +643,8 @@ fn unknown_record(line: &Line<'_>, letter: char, word: &str) -> MaError {
 
 const NO_RADII: &str = "points without radii: `--radii surface` takes their distances to a surface";
 
-const APPENDED: &str = "all that the header announces stands above: another medial mesh begins here, \
-                        written behind the first; `--block 1`, `--block 2` ... say which is meant";
+const APPENDED: &str = "all records of the header come before this line: another medial mesh begins here, \
+                        appended to the first; select one with `--block 1`, `--block 2` ...";
 
 const TRAILER: &str = "expected the parts of the structure behind the last record: a number of them, \
                        and for each `id type m` with m indices";
@@ -653,7 +653,7 @@ const TRAILER: &str = "expected the parts of the structure behind the last recor
 const IGNORED: [&str; 11] =
     ["vn", "vt", "vp", "o", "g", "s", "p", "usemtl", "mtllib", "mg", "usemap"];
 
-/// Whether lines of edges or faces stand in a text: they tell OBJ from a list of spheres.
+/// Whether a text has lines of edges or faces: they distinguish OBJ from a list of spheres.
 fn has_obj_elements(bytes: &[u8]) -> bool {
     bytes.split(|&byte| byte == b'\n').any(|line| {
         matches!(line.trim_ascii_start(), [b'l' | b'f', next, ..] if next.is_ascii_whitespace())
@@ -661,7 +661,7 @@ fn has_obj_elements(bytes: &[u8]) -> bool {
 }
 
 /// Reads a medial mesh from the text of an OBJ file: vertices `v x y z r`, lines `l i j ...`, triangles `f i j k`, with indices
-/// from 1 or, if negative, back from the last vertex; `name` stands for the file in errors.
+/// from 1 or, if negative, back from the last vertex; `name` is the file in errors.
 ///
 /// ```
 /// use medial::complex::{ReadOptions, parse_obj};
@@ -720,7 +720,7 @@ pub fn parse_obj(
 fn obj_indices(words: Words<'_>, vertices: usize) -> Result<Vec<u32>, MaError> {
     let mut indices = Vec::new();
     for word in words.rest {
-        // Behind a slash stand texture coordinates and normals.
+        // Texture coordinates and normals follow a slash.
         let number = word.split('/').next().and_then(|text| text.parse::<i64>().ok());
         let from_zero = number.and_then(|number| match number {
             1.. => Some(number - 1),
@@ -742,7 +742,7 @@ fn obj_indices(words: Words<'_>, vertices: usize) -> Result<Vec<u32>, MaError> {
 const FEWEST_OF_A_SURFACE: usize = 4;
 
 /// Brings the simplices of a file to canonical form: indices ascend, lists are sorted, every
-/// simplex stands once, every side of a face is an edge. The set of points covered stays the same.
+/// simplex is listed once, every side of a face is an edge. The set of points covered stays the same.
 ///
 /// Precondition: indices are below the number of spheres, and numbers are finite.
 ///

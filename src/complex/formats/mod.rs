@@ -28,7 +28,7 @@ pub use viewers::{Look, SphereValues, parse_ply};
 use super::{ComplexError, MedialMesh};
 use crate::atomic::write_atomically;
 
-/// A medial mesh from a file, in canonical form, and what had to be done to bring it there.
+/// A medial mesh from a file, in canonical form, and the changes that this took.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadedMa {
     /// The medial mesh, in the file's unit.
@@ -49,7 +49,7 @@ impl LoadedMa {
     }
 }
 
-/// How to read files that are not what their header says, or hold more or less than one medial mesh.
+/// How to read files that contradict their header, or hold more or less than one medial mesh.
 ///
 /// ```
 /// use medial::complex::{ReadOptions, parse_ma};
@@ -65,7 +65,7 @@ impl LoadedMa {
 pub struct ReadOptions {
     /// Takes the lines as they are where the header announces another number of them, with a warning.
     pub lenient: bool,
-    /// Which medial mesh of a file with several appended ones, from 1. Without it such a file is refused.
+    /// Which medial mesh of a file with several appended ones, from 1. Without it such a file is rejected.
     pub block: Option<usize>,
     /// Whether the radii of the file are wanted.
     pub radii: Radii,
@@ -74,11 +74,11 @@ pub struct ReadOptions {
 /// Whether the radii of a file are wanted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Radii {
-    /// A file without radii is refused. Of negative ones, which some tools write, the absolute values are taken, with a
+    /// A file without radii is rejected. Negative radii, which some tools write, become their absolute values, with a
     /// warning.
     #[default]
     Needed,
-    /// A negative radius is refused, too: for plug-ins, whose mistakes are to show.
+    /// A negative radius is rejected, too: for plug-ins, whose mistakes must show.
     NotNegative,
     /// The caller has radii: files of points are accepted, and the values in the place of radii (0 where there are none)
     /// mean nothing.
@@ -108,7 +108,7 @@ impl MaError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MaErrorKind {
-    /// The operating system refused.
+    /// Reading or writing failed.
     #[error(transparent)]
     Io(#[from] io::Error),
     /// The format cannot hold this mesh, or no such values.
@@ -125,8 +125,8 @@ pub enum MaErrorKind {
     Points,
 }
 
-/// Reads a medial mesh from a `.ma` file, a list of spheres, a `.ply` file or an `.obj` file with radii, told apart by
-/// the extension.
+/// Reads a medial mesh from a `.ma` file, a list of spheres, a `.ply` file or an `.obj` file with radii. The
+/// extension decides.
 ///
 /// # Errors
 /// When the file cannot be read, has another extension, or does not hold a medial mesh; the error
@@ -135,10 +135,10 @@ pub fn read(path: impl AsRef<Path>) -> Result<LoadedMa, MaError> {
     read_with(path, ReadOptions::default())
 }
 
-/// [`read`] for files that are not what their header says, hold several medial meshes, or no radii.
+/// [`read`] for files that contradict their header, hold several medial meshes, or no radii.
 ///
 /// # Errors
-/// As [`read`], but for what the options allow.
+/// As [`read`], with options.
 pub fn read_with(path: impl AsRef<Path>, options: ReadOptions) -> Result<LoadedMa, MaError> {
     let path = path.as_ref();
     parser(path)?;
@@ -174,7 +174,7 @@ fn parser<'a>(path: &Path) -> Result<Parser<'a>, MaError> {
     }
 }
 
-/// Writes a medial mesh as `.ma`, `.ply`, `.obj`, `.vtp` or `.glb`, told apart by the extension.
+/// Writes a medial mesh as `.ma`, `.ply`, `.obj`, `.vtp` or `.glb`. The extension decides.
 ///
 /// The file appears under its name only when it is complete: it is written next to the target
 /// and renamed. Contact points are not part of any of these formats.

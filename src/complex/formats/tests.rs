@@ -1,4 +1,4 @@
-//! One table for the dialects, one for the errors, and what must hold for any file.
+//! One table for the dialects, one for the errors, and properties of any file.
 
 use std::fs;
 
@@ -88,7 +88,7 @@ const TRIANGLES: [(&str, &str, &[&str]); 10] = [
         &["2 normals were not used"],
     ),
     (
-        "J, as far as it can be told: three words behind a face are a colour",
+        "J, as far as possible: three words behind a face are a colour",
         "3 3 1\nv 0 0 0 1\nv 1 0 0 2\nv 0 1 0 3\ne 0 1\ne 0 2\ne 1 2\nf 0 1 2 0.5 1 1\n",
         &[],
     ),
@@ -118,13 +118,13 @@ fn every_dialect_gives_the_same_bytes_as_the_plain_one() {
         let decorated = format!("\u{feff}# exported\r\n{}", lines.join(" # x\r\n\r\n"));
         assert_eq!(as_written(&load(&decorated).mesh), plain, "{dialect}, decorated");
         if !dialect.starts_with('E') {
-            // Spheres keep their order, whatever stands between them.
+            // Spheres keep their order, with anything between them.
             lines[1..].sort_by_key(|line| !line.starts_with(['e', 'f', 't', 'n']));
             let shuffled = load(&lines.join("\n")).mesh;
             assert_eq!(as_written(&shuffled), plain, "{dialect}, in another order");
         }
     }
-    // O: as OBJ, told by its lines, and by its extension with other statements and indices from the end.
+    // O: as OBJ, recognised by its lines, and by its extension with other statements and indices from the end.
     let obj = "v 0 0 0 1\nv 1 0 0 2\nv 0 1 0 3\nl 1 2\nl 3 1\nl 2 3\nf 1 2 3\n";
     assert_eq!(as_written(&load(obj).mesh), plain);
     let obj =
@@ -202,7 +202,7 @@ fn one_of_several_blocks_is_chosen() {
     let second = "1 0 0\nv 5 5 5 5\n";
     let text = format!("{PLAIN}{second}{PLAIN}1\n0 0 1\n0\n");
     let read = |block| parse_ma(&text, "x.ma", ReadOptions { block, ..ReadOptions::default() });
-    assert!(read(None).unwrap_err().to_string().starts_with("x.ma, line 9: all that"));
+    assert!(read(None).unwrap_err().to_string().starts_with("x.ma, line 9: all records"));
     for (number, alone) in [(1, PLAIN), (2, second), (3, PLAIN)] {
         assert_eq!(read(Some(number)).unwrap().mesh, load(alone).mesh, "{number}");
     }
@@ -238,7 +238,7 @@ fn disorder_is_repaired_and_reported() {
 
 type Parser = fn(Vec<u8>, &str, ReadOptions) -> Result<LoadedMa, MaError>;
 
-/// Each text is refused with an error that begins as given.
+/// Each text is rejected with an error that begins with this text.
 fn refuses(parse: Parser, options: ReadOptions, cases: &[(&str, &str)]) {
     for (text, expected) in cases {
         let error = parse(text.as_bytes().to_vec(), "x", options).expect_err(text).to_string();
@@ -439,7 +439,7 @@ fn damaged_files_are_refused_or_read_but_never_panic() {
                 accepted += 1;
             }
         }
-        assert!(accepted > 50, "so much damage hardly exercises the reader: {accepted}");
+        assert!(accepted > 50, "too much damage to exercise the reader: {accepted}");
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! In `.vtp` points are the spheres, with the point data `radius` and, on request, a second array. Cells are all faces
 //! (`Polys`), the edges *without a face* (`Lines`) and the spheres without an edge (`Verts`): a face brings its sides
-//! along, so that nothing is lost, and ParaView draws no line over a sheet unless asked ("Surface With Edges").
+//! along, so that nothing is lost, and ParaView draws no line over a sheet except by "Surface With Edges".
 //! Arrays are in base64 without compression: every number as it is in memory, bit for bit.
 //!
 //! Source: The VTK file formats, <https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>.
@@ -17,20 +17,20 @@ use crate::complex::{MedialMesh, Sphere, stability_ratio};
 use crate::surface::{Fault, Place, ply};
 use crate::{ColourMap, Vec3};
 
-/// A value at each sphere, and the colours that it stands for.
+/// Values at the spheres, and their colours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SphereValues {
     /// The word for it in files: `radius`, `stability`, `error`. Letters, digits and `_` only.
     pub name: &'static str,
     /// A finite value for each sphere.
     pub values: Vec<f64>,
-    /// The value at the low end of the colours; what is below has the same colour.
+    /// The value at the low end of the colours; lower values have the same colour.
     pub low: f64,
     /// The value at the high end.
     pub high: f64,
     /// The colours.
     pub map: ColourMap,
-    /// What the value is, in a few words, with its unit.
+    /// The value's meaning, in a few words, with its unit.
     pub meaning: &'static str,
 }
 
@@ -92,13 +92,13 @@ const SPANNED: f64 = 0.99;
 /// How a file for viewers shows a medial mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Look {
-    /// What it is coloured by; the radii where there is nothing. Only `.vtp` and `.glb` hold it.
+    /// The colouring; the radii by default. Only `.vtp` and `.glb` hold it.
     pub values: Option<SphereValues>,
     /// The spheres themselves as well, as round bodies of 80 triangles. Only in `.glb`.
     pub balls: bool,
 }
 
-/// Reads a medial mesh from a PLY file, text or binary; `name` stands for the file in errors.
+/// Reads a medial mesh from a PLY file, text or binary; `name` is the file in errors.
 ///
 /// Elements may come in any order and carry further properties. Vertices need `x`, `y`, `z` and `radius` (or `r`), edges
 /// `vertex1` and `vertex2`, faces a list `vertex_indices` (or `vertex_index`) of three.

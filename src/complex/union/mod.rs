@@ -49,7 +49,7 @@ pub struct MedialUnion {
     balls: Bounds,
 }
 
-/// A simplex of the mesh, which stands for its medial primitive. Ordered as evaluated: of equally
+/// A simplex of the mesh, the id of its medial primitive. Ordered as evaluated: of equally
 /// near primitives the smallest is reported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Primitive {
@@ -61,7 +61,7 @@ pub enum Primitive {
     Face(u32),
 }
 
-/// The answer to a query: a signed distance and the primitive it belongs to.
+/// The result of a query: a signed distance and the primitive it belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NearestPrimitive {
     /// Signed distance to that primitive, negative inside.
@@ -184,7 +184,7 @@ impl MedialUnion {
     }
 
     /// `sigma(p)`, searched from the primitive that the last call with the same `near` found. Faster
-    /// for consecutive nearby points; the answer is the same.
+    /// for consecutive nearby points; the result is the same.
     pub(crate) fn signed_from(&self, p: Vec3, near: &mut usize) -> f64 {
         let (nearest, place) = self.parts.nearest::<Signed>(p, *near);
         *near = place;
@@ -269,7 +269,7 @@ impl MedialUnion {
     /// [`deepest`](Self::deepest) for many points, in their order, in parallel. Each search begins with the
     /// primitive that `near` names for the point, or, where it names none, with the one that was found last:
     /// fast if these are near. Where `enough` has a distance for the point, any primitive that is no farther
-    /// away is an answer.
+    /// away is accepted.
     pub fn deepest_batch_near(
         &self,
         points: &[Vec3],
@@ -339,7 +339,7 @@ impl MedialUnion {
 
     /// Calls `each` for all primitives nearer to `p` than `limit` by signed distance, with that
     /// distance and the centre of the interpolated sphere that attains it. A slab is passed only if its
-    /// nearest sphere is inside the triangle; else the cones of its sides stand for it.
+    /// nearest sphere is inside the triangle; else the cones of its sides replace it.
     pub(crate) fn each_nearer(&self, p: Vec3, limit: f64, each: impl FnMut(f64, Vec3)) {
         self.parts.search(&mut Nearer { parts: &self.parts, p, limit, each });
     }
@@ -348,7 +348,7 @@ impl MedialUnion {
 /// Bound on the primitives that are left, one after the other, on the way out of a union.
 const MAX_EXITS: usize = 12;
 
-/// Queries that are answered one after the other on one thread.
+/// Queries that run one after the other on one thread.
 const RUN: usize = 512;
 
 /// Number of remembered primitives that buried a point.
@@ -369,7 +369,7 @@ fn ball_box(balls: &[Sphere]) -> Bounds {
 
 /// Spheres whose coordinates and radii agree to this share of the radius count as one. Distances change
 /// by at most six times that share: a sphere can differ by it, in centre and radius, from the one that
-/// stands for its group, and this one again from the sphere that is measured.
+/// represents its group, and this one again from the sphere that is measured.
 const EQUAL: f64 = 1e-13;
 
 /// A generic direction in space and radius: spheres at the same place along it are most likely equal.
@@ -377,7 +377,7 @@ const GENERIC: [f64; 4] = [0.612_372_4, 0.573_576_4, 0.543_988_1, 0.518_304_7];
 
 /// The simplices of a mesh that are to be measured.
 struct Distinct {
-    /// For each sphere the one that stands for its group.
+    /// For each sphere the one that represents its group.
     group: Vec<u32>,
     /// Whether some spheres are equal.
     any: bool,
@@ -412,7 +412,7 @@ impl Distinct {
         Self { group, any, seen: HashSet::new() }
     }
 
-    /// The sphere that stands for this one.
+    /// The representative of this sphere.
     #[inline]
     pub fn sphere(&self, v: u32) -> u32 {
         self.group[v as usize]
@@ -429,7 +429,7 @@ impl Distinct {
         (0..N).all(|k| (0..k).all(|j| self.sphere(simplex[j]) != self.sphere(simplex[k])))
     }
 
-    /// Whether no simplex on the same groups was asked for before.
+    /// Whether no simplex on the same groups was passed before.
     pub fn is_first<const N: usize>(&mut self, simplex: [u32; N]) -> bool {
         if !self.any {
             return true;

@@ -346,7 +346,7 @@ impl Shape {
     }
 
     /// As [`Shape::signed`], with the centre of the interpolated sphere that attains it; `None`
-    /// where a slab leaves the answer to the cones of its sides.
+    /// where a slab leaves the result to its cones.
     #[inline]
     pub fn nearest_centre(&self, p: Vec3) -> Option<(f64, Vec3)> {
         match self {
@@ -397,7 +397,7 @@ pub(super) struct Parts {
     slack: f64,
 }
 
-/// Where each primitive is among the parts, if it has a part of its own.
+/// Where each primitive is among the parts, if it has a separate part.
 pub(super) struct Places([Vec<u32>; 3]);
 
 impl Places {

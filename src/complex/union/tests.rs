@@ -1,5 +1,5 @@
-//! Single precision only tells what is worth measuring: answers are those of all primitives
-//! measured in double precision, bit by bit.
+//! Single precision only selects the primitives to measure: results are those of all primitives measured in double
+//! precision, bit by bit.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -67,7 +67,7 @@ fn all(mesh: &MedialMesh, p: Vec3) -> Vec<(f64, Primitive)> {
 }
 
 #[test]
-fn answers_are_those_of_all_primitives() {
+fn results_are_those_of_all_primitives() {
     let mut rng = Pcg64::seed_from_u64(7);
     let kinds = [
         "scattered",
@@ -118,7 +118,7 @@ fn answers_are_those_of_all_primitives() {
 
 /// Where a search begins does not matter, even if that is nonsense.
 #[test]
-fn what_was_near_does_not_change_the_answers() {
+fn the_start_of_a_search_does_not_change_its_result() {
     let mut rng = Pcg64::seed_from_u64(17);
     for kind in ["scattered", "clusters", "nested", "far apart"] {
         let mut mesh = mesh(kind, 60, &mut rng);
@@ -133,7 +133,7 @@ fn what_was_near_does_not_change_the_answers() {
         assert_eq!(union.deepest_batch_near(&points, &[], all), fresh, "{kind}");
         let far = NearestPrimitive { signed: 0.0, primitive: Primitive::Face(u32::MAX) };
         assert_eq!(union.deepest_batch_near(&points, &[far], all), fresh, "{kind}");
-        // What is enough is found where there is any, and everything else is as before.
+        // Depths that suffice are found if there are any, and everything else is as before.
         let enough = |i: usize| i.is_multiple_of(2).then_some(-0.05);
         let found = union.deepest_batch_near(&points, &before, enough);
         for (i, (found, fresh)) in found.iter().zip(&fresh).enumerate() {
@@ -143,7 +143,7 @@ fn what_was_near_does_not_change_the_answers() {
     }
 }
 
-/// The parts that stand for equal ones are as near as any, up to what equal means.
+/// The representatives of equal parts are as near as any, to the tolerance of equality.
 #[test]
 fn no_primitive_is_nearer_than_its_part() {
     let mut rng = Pcg64::seed_from_u64(11);
@@ -157,9 +157,9 @@ fn no_primitive_is_nearer_than_its_part() {
             for _ in 0..100 {
                 let p = vector(&mut rng) * 10.0_f64.powi(rng.random_range(-2..2));
                 let least = all(&mesh, p).iter().map(|part| part.0).fold(f64::INFINITY, f64::min);
-                let told = union.signed(p);
+                let found = union.signed(p);
                 let off = 6.0 * EQUAL + 1e-15 * (1.0 + p.length());
-                assert!((told - least).abs() <= off, "{kind}, {count}, {p}: {told} {least}");
+                assert!((found - least).abs() <= off, "{kind}, {count}, {p}: {found} {least}");
             }
         }
     }

@@ -315,7 +315,7 @@ impl Corners {
     }
 }
 
-/// Cells whose Voronoi vertices are on one side; the one after the last stands for infinity.
+/// Cells whose Voronoi vertices are on one side; the one after the last is infinity.
 fn joined(delaunay: &Delaunay, stations: &[[u32; 4]], free: &[bool]) -> DisjointSets {
     let infinity = free.len() as u32;
     let mut groups = DisjointSets::singletons(free.len() + 1);
@@ -341,7 +341,7 @@ struct Votes {
     outside: u32,
 }
 
-/// What the sectors say whose edge follows on a Voronoi edge from this cell.
+/// The votes of the sectors whose edge follows on a Voronoi edge from this cell.
 fn votes_of(delaunay: &Delaunay, sectors: &Sectors, cell: CellId, stations: [u32; 4]) -> Votes {
     let mut votes = Votes::default();
     for (opposite, station) in stations.into_iter().enumerate().filter(|s| s.1 != NONE) {

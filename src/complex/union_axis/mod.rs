@@ -18,7 +18,7 @@
 //! 3. Delaunay triangulation of `V`. The Voronoi vertex of a cell whose corners share a ball is that
 //!    ball's centre. A Voronoi edge whose corners share a ball passes through that ball's centre, and
 //!    only there does it cross the boundary of `K`; where they share two it runs along an edge of `K`.
-//!    So all other Voronoi edges join vertices on one side, and the sectors say on which
+//!    So all other Voronoi edges join vertices on one side, and the sectors decide on which
 //!    (file `sides.rs`).
 //! 4. The part of each Voronoi facet inside `K` is bounded by Voronoi edges inside, as far as the
 //!    first ball centre on them, and by the solid sectors, among which a singular triangle is one of
@@ -412,7 +412,7 @@ fn single(sides: &[Side]) -> Option<Polygon> {
 fn trace(sides: &[Side]) -> Traced {
     let sides = without_opposites(sides);
     let between = sides.first().map_or([NONE; 2], |s| s.corners);
-    // Sides from one vertex are consecutive; the index of the first stands for the vertex.
+    // Sides from one vertex are consecutive; the index of the first is the id of the vertex.
     let vertex = |v: u32| sides.partition_point(|s| s.from < v);
     let mut taken = vec![false; sides.len()];
     let mut on_path = vec![NONE; sides.len()];

@@ -11,7 +11,7 @@
 //! | 2 | 2^126 | 10 |
 //! | 3 | 2^1279, that is any two coordinates below 2^190 | 100 |
 //!
-//! Before tier 3, each axis is tried on a quantum of its own (file `axes.rs`).
+//! Before tier 3, each axis is tried on a separate quantum (file `axes.rs`).
 //!
 //! Compared with floating-point expansions: no branch depends on the data beyond the choice of
 //! the tier, exact zeros (cospherical points) cost no more than other values, and nothing overflows
@@ -217,7 +217,7 @@ fn orthocentre_wide<const D: usize, const D2: usize, const D3: usize, const D4: 
             let m: Wide<D2> = minor(&[u[x], u[y], u[x]], &[v[x], v[y], v[x]]);
             numerator = numerator.add(m.mul(lifts[i]));
         }
-        // Rounded here for the first time: three roundings in all, whatever the condition.
+        // Rounded here for the first time: three roundings in all, for any condition.
         let (num, num_exp) = numerator.to_scaled_f64();
         scale_by_power(num / den, num_exp - den_exp + quantum - 1)
     }))
@@ -385,7 +385,7 @@ fn close_differences<const K: usize>(
         for k in 0..3 {
             let scaled = d[i][k] * scale;
             integers[i][k] = scaled as i64;
-            // Beside a huge difference a tiny one underflows to 0, which is an integer, too.
+            // Next to a huge difference a tiny one underflows to 0, which is an integer, too.
             exact &= integers[i][k] as f64 == scaled && (scaled == 0.0) == (d[i][k] == 0.0);
         }
     }

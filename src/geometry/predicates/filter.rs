@@ -65,7 +65,7 @@ const ORIENTATION_BOUND: f64 = 8.5 * U;
 const IN_SPHERE_BOUND: f64 = 216.0 * U;
 /// 17 roundings of the determinant, and as many of the permanent.
 const PERMANENT_BOUND: f64 = 17.5 * U;
-/// What underflow takes from an orientation at most, with room to spare.
+/// Largest error of an orientation by underflow, with a margin.
 const ORIENTATION_UNDERFLOW: f64 = 1e-260;
 /// The same for the in-sphere test and the power test.
 pub(crate) const UNDERFLOW: f64 = 1e-145;
@@ -150,7 +150,7 @@ impl Filter {
         self.resolve::<M>(det, bound, cell, e)
     }
 
-    /// The sign of the power test from what [`Filter::lifted_determinant`] returned.
+    /// The sign of the power test from the result of [`Filter::lifted_determinant`].
     #[inline(always)]
     fn resolve<M: Metric>(self, det: f64, bound: f64, cell: [&Site; 4], e: &Site) -> Sign {
         if det.abs() > bound + UNDERFLOW || bound <= self.exact_power {
@@ -160,7 +160,7 @@ impl Filter {
         }
     }
 
-    /// The determinant of the power test in double precision, and a bound on its error beside
+    /// The determinant of the power test in double precision, and a bound on its error except
     /// [`UNDERFLOW`].
     #[inline(always)]
     pub(crate) fn lifted_determinant<M: Metric>(cell: [&Site; 4], e: &Site) -> (f64, f64) {
@@ -350,10 +350,10 @@ impl Real for Pair {
 // site, the larger its growth. If the test is zero, its perturbed sign is that of the first non-zero
 // cofactor, from the largest of the five sites downwards. The cofactor of a vertex is the
 // orientation of the cell with that vertex replaced by the query. The query's own cofactor is the
-// orientation of the cell, which is never zero, so there always is an answer.
+// orientation of the cell, which is never zero, so there always is a result.
 //
 // Orientation is never perturbed, hence no cell is flat. The result is the regular triangulation of
-// infinitesimally different weights: unique, whatever the order of insertion.
+// infinitesimally different weights: unique for any order of insertion.
 
 /// Whether `e` is in conflict with the positively oriented cell: inside its perturbed orthosphere.
 ///

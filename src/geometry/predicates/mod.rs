@@ -10,7 +10,7 @@
 //! opposite to Shewchuk's (`orient3d`, `insphere`), whose positive tetrahedron is our negative one.
 //!
 //! # Ties
-//! The functions here say [`Sign::Zero`] where points are coplanar or cospherical: nothing is
+//! The functions here return [`Sign::Zero`] where points are coplanar or cospherical: nothing is
 //! perturbed. The triangulations break these ties by a symbolic perturbation of their own.
 //!
 //! # Range
@@ -113,7 +113,7 @@ pub fn orient3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> Sign {
 }
 
 /// Whether three points lie on one line, exactly: for finite coordinates of at most
-/// [`MAX_COORDINATE`]. Of others the answer means nothing, and the call may panic.
+/// [`MAX_COORDINATE`]. For others the result has no meaning, and the call may panic.
 pub fn collinear(a: Vec3, b: Vec3, c: Vec3) -> bool {
     exact::collinear(&a.to_array(), &b.to_array(), &c.to_array())
 }
@@ -331,7 +331,7 @@ mod tests {
 
     #[test]
     fn extreme_ranges_are_exact() {
-        // Coordinates of 1e-300 beside others of 1e57 need the widest tier.
+        // Coordinates of 1e-300 next to others of 1e57 need the widest tier.
         let (big, tiny) = (1e57, 5e-324);
         let (o, x, y) = (Vec3::ZERO, Vec3::new(big, 0.0, 0.0), Vec3::new(0.0, big, 0.0));
         assert_eq!(orient3d(o, x, y, Vec3::new(1.0, 1.0, tiny)), Sign::Positive);
@@ -355,7 +355,7 @@ mod tests {
     #[test]
     fn circumcentres_of_slivers_are_exact() {
         // Four points of a unit circle, one lifted by 2^-50: the centre is on the axis, at
-        // half the lift plus what the determinant says, computed here in closed form.
+        // half the lift plus the determinant's part, computed here in closed form.
         let h = f64::powi(2.0, -50);
         let p = [Vec3::X, Vec3::Y, -Vec3::X, Vec3::new(0.0, -1.0, h)];
         let (centre, radius) = circumsphere(p).expect("not flat");
@@ -364,8 +364,8 @@ mod tests {
     }
 
     #[test]
-    fn huge_coordinates_beside_tiny_ones_have_the_sign_of_the_exact_stage() {
-        // Products of two tiny coordinates underflow, and a huge one multiplies what is lost.
+    fn huge_coordinates_next_to_tiny_ones_have_the_sign_of_the_exact_stage() {
+        // Products of two tiny coordinates underflow, and a huge one multiplies the loss.
         let huge = 2.944_495_945_799_024_7e47;
         let tiny = 9.704_187_067_161_276e-101;
         let p = [

@@ -450,7 +450,7 @@ mod tests {
         #[test]
         fn filters_agree_with_the_exact_stage(s in prop::array::uniform5(wild_site())) {
             prop_assert_eq!(signs(&s), exact_signs(&s));
-            // The other tiers: the same simplex beside a bit that widens the grid, in a weight that
+            // The other tiers: the same simplex with a bit that widens the grid, in a weight that
             // no sign depends on, is covered by the wild exponents; powers of two change nothing.
             let larger = s.map(|s| Site { p: s.p.map(|x| x * 1024.0), w: s.w * 1048576.0 });
             prop_assert_eq!(exact_signs(&larger), exact_signs(&s));
@@ -473,7 +473,7 @@ mod tests {
     }
 
     #[test]
-    fn nearly_touching_balls_are_told_apart() {
+    fn nearly_touching_balls_are_distinguished() {
         // Two unit balls at distance 2 touch; one bit further apart they do not.
         let at = |x: f64| Site { p: [x, 0.0, 0.0], w: 1.0 };
         assert_eq!(edge_size([&at(0.0), &at(2.0)]), Sign::Zero);

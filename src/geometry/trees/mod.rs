@@ -1,6 +1,6 @@
 //! Points and boxes in trees.
 //!
-//! [`PointTree`] answers the common questions about points: the nearest one, and those within a
+//! [`PointTree`] finds points by distance: the nearest one, and those within a
 //! distance. The rest of this module is for your own searches, over any items that have boxes.
 //!
 //! [`Tree`] is a bounding-volume hierarchy: a flat binary tree over boxes, built by the binned
@@ -51,10 +51,10 @@
 //! ```
 //!
 //! # Deviations from the literature
-//! Answers depend neither on the order in which the tree is searched nor on the bound that a search
-//! starts from: a box is skipped only if it is farther than the best answer by more than rounding
+//! Results depend neither on the order in which the tree is searched nor on the bound that a search
+//! starts from: a box is skipped only if it is farther than the best result by more than rounding
 //! can explain, and equal distances are decided by the smaller index. So a batch may start each query
-//! from its neighbour's answer, in any chunks, on any number of threads.
+//! from its neighbour's result, in any chunks, on any number of threads.
 
 mod search;
 mod wide;
@@ -293,7 +293,7 @@ struct Place {
 fn split(nodes: &mut Vec<Node>, index: usize, items: &mut [Item], place: Place, plan: Plan) {
     let Place { first, depth } = place;
     let count = items.len();
-    // No plane is sought where none can pay: a split costs a descent beside its parts. With groups
+    // No plane is sought where none can pay: a split costs a descent besides its parts. With groups
     // as large as leaves, that is half of all ranges.
     if count < 2 || (count <= plan.max_leaf && plan.cost(count) <= DESCENT) {
         return;
@@ -415,14 +415,14 @@ fn partition(items: &mut [Item], plane: &Plane) -> usize {
 }
 
 // Points along a Morton curve, and batches of queries along it, in which each query may start from
-// the answer of the one before.
+// the result of the one before.
 
 /// Consecutive queries on one thread: enough that the first, which starts from nothing, does not
 /// matter, and few enough to balance the load.
 const CHUNK: usize = 1024;
 
-/// Answers a query for each point. `answer` may keep in its state anything that speeds up the next,
-/// nearby query, but no answer may depend on the state.
+/// Runs a query for each point. `answer` may keep in its state anything that speeds up the next,
+/// nearby query, but no result may depend on the state.
 pub fn in_morton_order<S, R>(points: &[Vec3], answer: impl Fn(&mut S, Vec3) -> R + Sync) -> Vec<R>
 where
     S: Default,
@@ -557,7 +557,7 @@ mod tests {
     }
 
     #[test]
-    fn answers_come_back_in_the_order_of_the_points() {
+    fn results_are_in_the_order_of_the_points() {
         let points: Vec<Vec3> = (0..5000)
             .map(|i| Vec3::new((f64::from(i) * 0.37).sin(), f64::from(i % 71), 0.5))
             .collect();

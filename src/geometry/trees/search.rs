@@ -217,7 +217,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_is_near_what_is_not_finite() {
+    fn non_finite_points_have_no_neighbours() {
         let tree = PointTree::new(&[Vec3::ZERO, Vec3::X]);
         for query in [Vec3::INFINITY, Vec3::NAN, Vec3::splat(1e200)] {
             assert_eq!(tree.nearest(query), None);
@@ -227,7 +227,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn answers_are_those_of_looking_at_all(
+        fn results_are_those_of_exhaustive_search(
             points in prop::collection::vec(prop::array::uniform3(-9_i8..9), 1..200),
             query in prop::array::uniform3(-12.0_f64..12.0),
             reach in 0.0_f64..12.0,

@@ -7,7 +7,7 @@
 //!    1, and rounded outward to single precision. Queries are moved, scaled and rounded alike.
 //! 3. A computed distance is off by at most [`BLUR`] times one plus the query's distance from the
 //!    centre. Limits are enlarged by that, so nothing is skipped that double precision would visit,
-//!    and answers do not depend on any of this.
+//!    and results do not depend on any of this.
 
 use std::ops::{ControlFlow, Range};
 
@@ -112,7 +112,7 @@ impl WideTree {
     }
 
     /// Collapses a tree in the frame of a box around its own. Boxes no larger than `least` half
-    /// sides of the frame are leaves, whatever they hold. `each` gets the children of every node, up to
+    /// sides of the frame are leaves with any content. `each` gets the children of every node, up to
     /// four, in the order of the nodes.
     pub(super) fn within(
         tree: &Tree,

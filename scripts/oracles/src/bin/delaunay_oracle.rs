@@ -219,7 +219,7 @@ fn plane(n: u32) -> Vec<Vec3> {
     grid.chain([Vec3::Z, -Vec3::Z]).collect()
 }
 
-/// `n` points of a line and two beside it.
+/// `n` points of a line and two next to it.
 fn line(n: u32) -> Vec<Vec3> {
     let on_line = (0..n).map(|i| Vec3::new(1.0, 2.0, 3.0) * f64::from(i) / 100.0);
     on_line.chain([Vec3::Y, Vec3::Z]).collect()

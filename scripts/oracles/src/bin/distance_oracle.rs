@@ -1,5 +1,5 @@
-//! One side of the comparison with CGAL: makes a mesh with queries, answers them, and compares the
-//! answers with those of `scripts/oracles/distance_cgal.cpp`.
+//! One side of the comparison with CGAL: makes a mesh with queries, runs them, and compares the
+//! results with those of `scripts/oracles/distance_cgal.cpp`.
 //!
 //! ```text
 //! distance_oracle make NAME COUNT FILE   `torus` (100,352 triangles) or a mesh file, with COUNT
