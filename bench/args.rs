@@ -53,7 +53,8 @@ impl Global {
 /// How the substrates of a shape are built.
 #[derive(Clone, Debug, Args)]
 pub struct SubstrateArguments {
-    /// Boundary samples: `vertices`, `auto`, `uniform:COUNT` or `blue:COUNT` [default: vertices].
+    /// Boundary samples: `vertices`, `conforming` (with points that make the topology right), `uniform:COUNT`
+    /// or `blue:COUNT` [default: vertices].
     #[arg(long, value_name = "SAMPLING")]
     pub sampling: Option<String>,
     /// Triangulation of the dual Voronoi polygons [default: fan].

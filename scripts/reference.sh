@@ -15,7 +15,7 @@ shift
 medial=${MEDIAL:-$(dirname "$0")/../target/release/medial}
 methods=angle,lambda,dey-zhao,qmat,pmat,hem,sat,sat-pairwise,tam-heidrich,aof
 
-# Exit code 3: some methods miss a count, which the tables show.
+# Exit code 3: a run failed, which the tables show.
 compare() { "$medial" compare "$@" --counts-only --threads 1 --out "$folder" -q || [ $? -eq 3 ]; }
 compare "$@" --methods "$methods,tight" --spheres 1000,500,100 --timeout 900 --budget 900
 compare "$@" --methods "$methods" --spheres 100 --max-error 0.02,0.01,0.005,0.002 --samples 10000 --timeout 1800 --budget 1800

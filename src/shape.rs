@@ -6,7 +6,6 @@
 //! from the mesh. [`Shape::view`] opens a fresh view on the same store.
 
 mod balls;
-mod refined;
 mod similarity;
 
 use std::collections::{BTreeMap, HashMap};
@@ -19,10 +18,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
 use crate::complex::{
-    CellSpheres, ComplexError, DualTriangulation, MedialMesh, VoronoiFacets, voronoi_medial_mesh,
+    CellSpheres, ComplexError, Conforming, ConformingError, DualTriangulation, MedialMesh,
+    VoronoiFacets, voronoi_medial_mesh,
 };
 use crate::diagnostics::Diagnostics;
-use crate::geometry::{Delaunay, TriangulationError};
+use crate::geometry::{Delaunay, TriangulationError, VertexId};
 use crate::heap::{Usage, usage_apart, usage_of};
 use crate::metrics::{Judge, JudgeOptions, Truth};
 use crate::surface::{
@@ -30,7 +30,6 @@ use crate::surface::{
 };
 
 pub use balls::{ContactSets, InnerBalls, PolarBalls};
-pub use refined::{BOUND, ENOUGH, MOST_TIMES, ROUNDS, Refined, Refinement};
 pub use similarity::{Fit, FitSource, Similarity};
 
 /// One input shape, normalised to a bounding-box diagonal of 1, and its substrates.
@@ -87,14 +86,51 @@ struct OfSamples {
     /// Whether it is no substrate that methods share, but the work of the method that asked for it.
     is_of_asker: bool,
     samples: Cache<Sampling, Arc<[Vec3]>>,
-    /// Defects that [`Sampling::Auto`] could not mend.
-    unmended: OnceLock<String>,
-    delaunay: Cache<Sampling, Arc<Delaunay>>,
+    delaunay: Cache<Sampling, Arc<Triangulated>>,
     cells: Cache<Sampling, Arc<CellSpheres>>,
     facets: Cache<Sampling, Arc<VoronoiFacets>>,
     medial: Cache<Sampling, Arc<MedialMesh>>,
     balls: Cache<Sampling, Arc<InnerBalls>>,
 }
+
+/// The samples with their Delaunay triangulation.
+struct Triangulated {
+    delaunay: Arc<Delaunay>,
+    /// For each finite cell whether it is in the solid, where the surface is part of the triangulation; or why it
+    /// is not, though that was requested.
+    is_inside: Result<Vec<bool>, Option<String>>,
+}
+
+impl Triangulated {
+    /// The triangulation that [`Sampling::Conforming`] requests, or that of the vertices.
+    fn conforming(mesh: &TriMesh, report: &SurfaceReport) -> Result<Self, TriangulationError> {
+        let found = match report.intersecting_pairs {
+            0 => Conforming::new(mesh, (8 * mesh.vertices.len()).max(LEAST_BUDGET)),
+            // No refinement would end.
+            _ => Err(ConformingError::Crossing),
+        };
+        match found {
+            Ok(Conforming { delaunay, is_inside, .. }) => {
+                Ok(Self { delaunay: Arc::new(delaunay), is_inside: Ok(is_inside) })
+            }
+            Err(ConformingError::Triangulation(error)) => Err(error),
+            Err(why) => {
+                let why = format!(
+                    "the vertices alone are the samples, so the initial medial mesh may have another topology than the \
+                     solid: {why}"
+                );
+                Ok(Self { is_inside: Err(Some(why)), ..Self::plain(&mesh.vertices)? })
+            }
+        }
+    }
+
+    fn plain(samples: &[Vec3]) -> Result<Self, TriangulationError> {
+        Ok(Self { delaunay: Arc::new(Delaunay::new(samples)?), is_inside: Err(None) })
+    }
+}
+
+/// Points that may be added to a coarse surface; to others eight for each vertex.
+const LEAST_BUDGET: usize = 20_000;
 
 /// The part that does not depend on the samples.
 #[derive(Default)]
@@ -394,6 +430,12 @@ impl<K, T> Default for Cache<K, T> {
 }
 
 impl<K: Eq + Hash, T: Clone> Cache<K, T> {
+    /// The value for a key, if it is built.
+    fn known(&self, key: &K) -> Option<Result<T, ShapeError>> {
+        let slots = self.slots.lock().expect("no panic while held");
+        slots.get(key)?.get().map(|(value, _)| value.clone())
+    }
+
     /// The value for a key; a second asker waits for the first. `is_of_asker`: what building needs of
     /// the heap is part of the work that asked for it.
     pub fn get(
@@ -418,22 +460,21 @@ impl<K: Eq + Hash, T: Clone> Cache<K, T> {
 // The substrates of a shape, each built once, on demand.
 
 impl Shape {
-    /// The boundary samples of the shape's own sampling.
+    /// The boundary samples.
     pub fn samples(&self) -> Arc<[Vec3]> {
-        self.samples_by(&self.store.options.sampling)
-    }
-
-    /// Boundary samples by another sampling. [`Sampling::Auto`] costs several medial meshes, which
-    /// count as the cost of the samples.
-    pub fn samples_by(&self, sampling: &Sampling) -> Arc<[Vec3]> {
-        let refined = match sampling {
-            Sampling::Auto => self.surface_tree().ok().zip(Some(self.inside_test())),
+        let Store { of_samples, options, mesh, .. } = &*self.store;
+        let triangulated = match options.sampling {
+            Sampling::Conforming => self.triangulated().ok(),
             _ => None,
         };
-        let of_samples = &self.store.of_samples;
-        let built = of_samples.samples.get(*sampling, of_samples.is_of_asker, || {
-            let refined = refined.and_then(|(tree, inside)| self.refined(&tree, &inside));
-            Ok(refined.unwrap_or_else(|| sample(&self.store.mesh, sampling).into()))
+        let built = of_samples.samples.get(options.sampling, of_samples.is_of_asker, || {
+            Ok(match triangulated.as_deref() {
+                Some(Triangulated { delaunay, .. }) => {
+                    let all = 0..delaunay.point_count() as u32;
+                    all.map(|v| delaunay.point(VertexId(v))).collect()
+                }
+                None => sample(mesh, &options.sampling).into(),
+            })
         });
         self.take(Substrate::Samples, built).expect("sampling cannot fail")
     }
@@ -448,23 +489,30 @@ impl Shape {
         cache(of_samples).get(options.sampling, of_samples.is_of_asker, build)
     }
 
-    /// The samples of [`Sampling::Auto`]; none where the vertices do not span space, which
-    /// triangulating them reports.
-    fn refined(&self, tree: &TriangleBvh, inside: &InsideTest) -> Option<Arc<[Vec3]>> {
-        let expected = self.expected_betti();
-        let (mesh, dual) = (&self.store.mesh, self.store.options.dual);
-        let refined = Refinement { mesh, tree, inside, expected, dual }.run().ok()?;
-        if let Some(warning) = refined.warning() {
-            // The first: another view that builds the same samples says the same.
-            let _ = self.store.of_samples.unmended.set(warning);
-        }
-        Some(refined.samples.into())
+    /// Why [`Sampling::Conforming`] could not be had, once the samples are triangulated.
+    pub fn sampling_warning(&self) -> Option<String> {
+        let Store { of_samples, options, .. } = &*self.store;
+        let known = of_samples.delaunay.known(&options.sampling)?;
+        known.ok()?.is_inside.as_ref().err()?.clone()
     }
 
-    /// What is wrong with the medial mesh of the samples all the same, where [`Sampling::Auto`] reached
-    /// one of its limits; once they are built.
-    pub fn sampling_warning(&self) -> Option<&str> {
-        self.store.of_samples.unmended.get().map(String::as_str)
+    fn triangulated(&self) -> Result<Arc<Triangulated>, ShapeError> {
+        let Store { options, mesh, report, .. } = &*self.store;
+        let samples = match options.sampling {
+            Sampling::Conforming => None,
+            _ => Some(self.samples()),
+        };
+        let built = self.built(
+            |of_samples| &of_samples.delaunay,
+            || {
+                let triangulated = match &samples {
+                    None => Triangulated::conforming(mesh, report),
+                    Some(samples) => Triangulated::plain(samples),
+                };
+                Ok(Arc::new(triangulated?))
+            },
+        );
+        self.take(Substrate::Delaunay, built)
     }
 
     /// The Delaunay triangulation of the boundary samples.
@@ -472,25 +520,27 @@ impl Shape {
     /// # Errors
     /// When the samples do not span space.
     pub fn delaunay(&self) -> Result<Arc<Delaunay>, ShapeError> {
-        let samples = self.samples();
-        let built = self.built(
-            |of_samples| &of_samples.delaunay,
-            || Delaunay::new(&samples).map(Arc::new).map_err(ShapeError::from),
-        );
-        self.take(Substrate::Delaunay, built)
+        Ok(Arc::clone(&self.triangulated()?.delaunay))
     }
 
-    /// The circumspheres of the Delaunay cells and which of them are centred inside.
+    /// The circumspheres of the Delaunay cells, and which of them are inside: in a conforming triangulation the
+    /// cells of the solid, with centres moved into them where they are outside, else the spheres centred inside.
     ///
     /// # Errors
     /// When the samples do not span space.
     pub fn cells(&self) -> Result<Arc<CellSpheres>, ShapeError> {
-        let delaunay = self.delaunay()?;
+        let triangulated = self.triangulated()?;
         let tree = self.surface_tree()?;
         let inside = self.inside_test();
         let built = self.built(
             |of_samples| &of_samples.cells,
-            || Ok(Arc::new(CellSpheres::classify(&delaunay, &inside, &tree))),
+            || {
+                let Triangulated { delaunay, is_inside } = &*triangulated;
+                Ok(Arc::new(match is_inside {
+                    Ok(known) => CellSpheres::of_cells(delaunay, known.clone(), &inside, &tree),
+                    Err(_) => CellSpheres::classify(delaunay, &inside, &tree),
+                }))
+            },
         );
         self.take(Substrate::Inside, built)
     }

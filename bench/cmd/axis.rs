@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use medial::surface::Sampling;
 use medial::{complex, metrics};
 use serde_json::json;
 
@@ -60,12 +61,14 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let [seconds, cpu_seconds] = stages.seconds();
     let expected = shape.expected_betti();
     let mut warnings = shape.report().warnings.clone();
-    warnings.extend(shape.sampling_warning().map(str::to_owned));
+    warnings.extend(shape.sampling_warning());
     if let Some(expected) = expected.filter(|&expected| expected != betti) {
+        let advice = match shape.options().sampling {
+            Sampling::Conforming => "",
+            _ => "; try --sampling conforming",
+        };
         warnings.push(format!(
-            "the medial mesh has Betti numbers {betti:?}, the solid {expected:?}: the samples are too \
-             coarse somewhere, or parts touch; try --sampling auto, or blue:{}",
-            (4 * shape.samples().len()).min(1_000_000)
+            "the medial mesh has Betti numbers {betti:?}, the solid {expected:?}{advice}"
         ));
     }
     let object = json!({

@@ -103,7 +103,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let simplified = run.outcome.map_err(|fault| arguments.failure(fault))?;
     fill_result(&mut simplify, &simplified);
     line.at("checking the topology");
-    simplify.warnings.extend(shape.sampling_warning().map(str::to_owned));
+    simplify.warnings.extend(shape.sampling_warning());
     simplify.warnings.extend(topology_warnings(&simplified.mesh, &shape));
     line.at("writing");
     arguments.outputs.write(&simplified, &shape)?;
@@ -141,7 +141,7 @@ fn topology_warnings(result: &MedialMesh, shape: &Shape) -> Vec<String> {
     let initial = shape.initial().ok();
     let start = initial.and_then(|initial| topology_warning(complex::betti(&initial), expected));
     let start = start.map(|start| {
-        format!("the initial medial mesh is not right either ({start}); `--sampling auto` adds samples where it fails")
+        format!("the initial medial mesh is not right either ({start}); try `--sampling conforming`")
     });
     [Some(format!("the topology differs from the solid's: {own}")), start]
         .into_iter()

@@ -298,7 +298,7 @@ impl Found {
         });
         format!(
             "none of {} levels that were tried has a Hausdorff error of at most {} of the diagonal{best}; \
-             allow more, or sample more densely (`--sampling auto`)",
+             allow more, or sample more densely (`--sampling blue:N`)",
             self.tried,
             percent(bound)
         )

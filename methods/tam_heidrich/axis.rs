@@ -483,7 +483,7 @@ fn shared_sample(
 /// samples.
 fn poles(delaunay: &Delaunay, cells: &CellSpheres) -> Vec<bool> {
     let spheres = cells.circumspheres();
-    let inside = delaunay.finite_cells().filter(|&cell| cells.is_inside(cell));
+    let inside = delaunay.finite_cells().filter(|&cell| cells.is_centred_inside(cell));
     let inside: Vec<(CellId, f64)> =
         inside.map(|cell| (cell, spheres[cell.index()].map_or(0.0, |s| s.radius))).collect();
     let mut farthest = vec![0.0_f64; delaunay.point_count()];

@@ -224,7 +224,7 @@ class Mesh:
         """The Voronoi medial mesh, from which methods start.
 
         Args:
-            sampling: `vertices`, `auto` (adds samples where the axis fails), `uniform:COUNT` or `blue:COUNT`.
+            sampling: `vertices`, `conforming` (adds points that make the topology right), `uniform:COUNT` or `blue:COUNT`.
             dual: How Voronoi polygons are triangulated: `fan` or `delaunay`.
             seed: Seed of random samples.
             threads: Threads of a separate pool; by default all calls share one.

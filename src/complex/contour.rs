@@ -27,13 +27,13 @@
 //! [`union_betti`](crate::metrics::union_betti) detects this.
 
 use std::collections::HashMap;
-use std::hash::{BuildHasherDefault, Hasher};
+use std::hash::BuildHasherDefault;
 
 use rayon::prelude::*;
 
 use super::{MedialMesh, MedialUnion, UnionError};
 use crate::Vec3;
-use crate::geometry::hash::splitmix;
+use crate::geometry::hash::KeyHasher;
 use crate::surface::{Folds, TriMesh, contract_short_edges};
 
 /// The boundary surface of a union, see [`union_surface`].
@@ -587,24 +587,6 @@ impl Bisection {
 
 /// The lowest bit of each coordinate of a key.
 const ODD: u64 = 1 | 1 << 21 | 1 << 42;
-
-/// Spreads keys over the table; there is no adversary.
-#[derive(Default)]
-struct KeyHasher(u64);
-
-impl Hasher for KeyHasher {
-    fn finish(&self) -> u64 {
-        self.0
-    }
-
-    fn write(&mut self, bytes: &[u8]) {
-        bytes.iter().for_each(|&b| self.write_u64(self.0 ^ u64::from(b)));
-    }
-
-    fn write_u64(&mut self, key: u64) {
-        self.0 = splitmix(key);
-    }
-}
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,7 @@
 //! The medial mesh: a simplicial complex of dimension at most two on medial spheres.
 
 pub mod collapse;
+mod conforming;
 mod contour;
 mod formats;
 mod mesh;
@@ -9,6 +10,7 @@ mod union;
 pub mod union_axis;
 mod voronoi;
 
+pub use conforming::{Conforming, ConformingError};
 pub use contour::{ContourError, UnionSurface, union_surface, union_surface_while};
 pub use formats::{
     LoadedMa, Look, MaError, MaErrorKind, Radii, ReadOptions, SphereValues, parse_ma, parse_obj,

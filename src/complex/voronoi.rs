@@ -46,6 +46,8 @@ pub enum DualTriangulation {
 pub struct CellSpheres {
     /// Circumsphere of each finite cell; `None` where it is not representable.
     circumspheres: Vec<Option<Sphere>>,
+    /// Spheres of the medial mesh that are no circumspheres, by cell, ascending.
+    moved: Vec<(CellId, Sphere)>,
     /// For each finite cell.
     is_inside: Vec<bool>,
     /// The cells centred inside, along a Morton curve of their centres: neighbours are then close in
@@ -76,13 +78,56 @@ impl CellSpheres {
             })
             .collect();
         let in_guard_band = near.iter().filter(|&&near| near).count();
-        let cells = delaunay.triangulation().finite_cells().zip(&circumspheres);
-        let (cells, centres): (Vec<CellId>, Vec<Vec3>) = cells
-            .filter(|(cell, _)| is_inside[cell.index()])
-            .filter_map(|(cell, sphere)| Some((cell, sphere.as_ref()?.centre)))
-            .unzip();
-        let kept = morton_order(&centres).into_iter().map(|(_, i)| cells[i as usize]).collect();
-        Self { circumspheres, is_inside, kept, in_guard_band }
+        Self { in_guard_band, ..Self::of_inside(delaunay, circumspheres, is_inside, vec![]) }
+    }
+
+    /// The spheres of cells of which it is known whether they are inside. A centre that is not inside is
+    /// moved into its cell, and its sphere shrunk to the surface.
+    pub fn of_cells(
+        delaunay: &Delaunay,
+        is_inside: Vec<bool>,
+        inside: &InsideTest,
+        surface: &TriangleBvh,
+    ) -> Self {
+        let circumspheres = delaunay.circumspheres();
+        let asked: Vec<u32> =
+            (0..).zip(&is_inside).filter(|(_, inside)| **inside).map(|(c, _)| c).collect();
+        // A sphere that is not representable is as wrong as one that is centred outside.
+        let centre = |cell: u32| circumspheres[cell as usize].map_or(Vec3::INFINITY, |s| s.centre);
+        let centres: Vec<Vec3> = asked.iter().map(|&cell| centre(cell)).collect();
+        let sides = inside.sides(&centres);
+        let moved: Vec<(CellId, Sphere)> = (asked.par_iter().zip(&sides).zip(&centres))
+            .filter(|&((_, &side), &centre)| {
+                side != Side::Inside || surface.any_within(centre, GUARD_BAND)
+            })
+            .map(|((&cell, _), &centre)| {
+                let corners = delaunay.vertices(CellId(cell)).map(|v| delaunay.point(v));
+                let centre = nearest_within(corners, centre);
+                (CellId(cell), Sphere::new(centre, surface.closest(centre).distance))
+            })
+            .collect();
+        Self::of_inside(delaunay, circumspheres, is_inside, moved)
+    }
+
+    fn of_inside(
+        delaunay: &Delaunay,
+        circumspheres: Vec<Option<Sphere>>,
+        is_inside: Vec<bool>,
+        moved: Vec<(CellId, Sphere)>,
+    ) -> Self {
+        let mut found =
+            Self { circumspheres, moved, is_inside, kept: Vec::new(), in_guard_band: 0 };
+        let cells = delaunay.triangulation().finite_cells().filter(|&cell| found.is_inside(cell));
+        let (cells, centres): (Vec<CellId>, Vec<Vec3>) =
+            cells.filter_map(|cell| Some((cell, found.sphere(cell)?.centre))).unzip();
+        found.kept = morton_order(&centres).into_iter().map(|(_, i)| cells[i as usize]).collect();
+        found
+    }
+
+    /// The sphere of a cell in the medial mesh.
+    fn sphere(&self, cell: CellId) -> Option<Sphere> {
+        let moved = self.moved.binary_search_by_key(&cell, |&(cell, _)| cell);
+        moved.map_or(self.circumspheres[cell.index()], |place| Some(self.moved[place].1))
     }
 
     /// The circumspheres of all finite cells, those centred outside included, see
@@ -93,10 +138,15 @@ impl CellSpheres {
 
     /// The spheres that are centred inside, in the order of the Voronoi medial mesh.
     fn inner_spheres(&self) -> impl Iterator<Item = Sphere> + '_ {
-        self.kept.iter().filter_map(|cell| self.circumspheres[cell.index()])
+        self.kept.iter().filter_map(|&cell| self.sphere(cell))
     }
 
     /// Whether the circumcentre of a cell is inside; never for infinite cells.
+    pub fn is_centred_inside(&self, cell: CellId) -> bool {
+        self.is_inside(cell) && self.moved.binary_search_by_key(&cell, |&(cell, _)| cell).is_err()
+    }
+
+    /// Whether a cell is part of the solid, or else whether its circumcentre is inside; never for infinite cells.
     pub fn is_inside(&self, cell: CellId) -> bool {
         // Finite cells come first; infinite ones are beyond the list.
         self.is_inside.get(cell.index()).is_some_and(|&inside| inside)
@@ -111,6 +161,18 @@ impl CellSpheres {
         }
         ids
     }
+}
+
+/// How much of its cell a centre may reach that is moved into it, from the centroid.
+const SHRUNK: f64 = 0.9;
+
+/// The point of a tetrahedron, shrunk a little, that is nearest to a point; its centroid for none.
+fn nearest_within(corners: [Vec3; 4], p: Vec3) -> Vec3 {
+    let centroid = corners.into_iter().sum::<Vec3>() / 4.0;
+    let shrunk = corners.map(|corner| centroid.lerp(corner, SHRUNK));
+    let faces = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]].map(|face| face.map(|k| shrunk[k]));
+    let nearest = TriangleBvh::from_triangles(&faces).ok().filter(|_| p.is_finite());
+    nearest.map_or(centroid, |faces| faces.closest(p).point)
 }
 
 /// The Voronoi medial mesh of a triangulation of boundary samples, with contact points. Spheres

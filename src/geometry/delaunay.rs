@@ -10,7 +10,8 @@ use rayon::prelude::*;
 
 use super::Sphere;
 use super::triangulation::{
-    CellId, Triangulated, Triangulation, TriangulationError, VertexId, Violation, triangulate,
+    CellId, Triangulated, Triangulation, TriangulationError, VertexId, Violation, extend,
+    triangulate,
 };
 use crate::Vec3;
 use crate::predicates::{Filter, MAX_COORDINATE, Site, Unweighted, circumsphere, lexicographic};
@@ -57,6 +58,31 @@ impl Delaunay {
         let Triangulated { triangulation, repeated, filter } = triangulate::<Unweighted>(&sites)?;
         let duplicates = repeated.into_iter().map(|(i, j)| (VertexId(i), VertexId(j))).collect();
         Ok(Self { triangulation, sites, duplicates, filter })
+    }
+
+    /// Adds points; their ids follow those of the points before. The cells are those of a triangulation of
+    /// all points. Cost: near `O(n)` for the bookkeeping, and `O(log n)` expected for each point that is
+    /// added.
+    ///
+    /// ```
+    /// use medial_geometry::{Vec3, delaunay::Delaunay};
+    ///
+    /// let mut tetrahedron = Delaunay::new(&[Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z])?;
+    /// tetrahedron.insert(&[Vec3::splat(0.25)])?;
+    /// assert_eq!(tetrahedron.finite_cell_count(), 4);
+    /// # Ok::<(), medial_geometry::triangulation::TriangulationError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Delaunay::new`]; the triangulation is then as it was.
+    pub fn insert(&mut self, points: &[Vec3]) -> Result<(), TriangulationError> {
+        let mut sites = self.sites.clone();
+        sites.extend(admissible_sites(points)?);
+        let extended = extend::<Unweighted>(&self.triangulation, &sites, self.sites.len())?;
+        let Triangulated { triangulation, repeated, filter } = extended;
+        let duplicates = repeated.into_iter().map(|(i, j)| (VertexId(i), VertexId(j))).collect();
+        *self = Self { triangulation, sites, duplicates, filter };
+        Ok(())
     }
 
     /// The combinatorial triangulation.

@@ -57,6 +57,8 @@ pub mod union_boundary;
 
 /// A hash of numbers, the same on every machine.
 pub mod hash {
+    use std::hash::Hasher;
+
     /// The finaliser of SplitMix64, whose high and low bits both mix: G. L. Steele, D. Lea, C. H. Flood:
     /// *Fast splittable pseudorandom number generators*, OOPSLA 2014, doi:10.1145/2660193.2660195.
     #[inline]
@@ -65,6 +67,24 @@ pub mod hash {
         z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ z >> 31
+    }
+
+    /// Spreads keys over the table; there is no adversary.
+    #[derive(Default)]
+    pub struct KeyHasher(u64);
+
+    impl Hasher for KeyHasher {
+        fn finish(&self) -> u64 {
+            self.0
+        }
+
+        fn write(&mut self, bytes: &[u8]) {
+            bytes.iter().for_each(|&b| self.write_u64(self.0 ^ u64::from(b)));
+        }
+
+        fn write_u64(&mut self, key: u64) {
+            self.0 = splitmix(key);
+        }
     }
 }
 

@@ -35,6 +35,7 @@ use super::MetricError;
 use super::samples::Pose;
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion};
+use crate::geometry::hash::splitmix;
 use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
 
 /// How the boundary of a union is sampled.
@@ -199,16 +200,8 @@ fn patches(mesh: &MedialMesh, pose: &Pose) -> Vec<Patch> {
 impl Patch {
     /// The seed of the random numbers that turn it.
     fn stream(&self) -> u64 {
-        self.cells.as_flattened().iter().fold(self.kind, |hash, &cell| mix(hash ^ cell))
+        self.cells.as_flattened().iter().fold(self.kind, |hash, &cell| splitmix(hash ^ cell))
     }
-}
-
-/// The finaliser of SplitMix64: every bit of the input moves half of the bits of the result.
-fn mix(mut bits: u64) -> u64 {
-    bits = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    bits ^ (bits >> 31)
 }
 
 /// The candidates of all patches at one density (points per area) that are not buried.

@@ -13,7 +13,6 @@ mod spikes;
 mod union_topology;
 mod volume;
 
-pub(crate) use ascent::icosahedron;
 pub use ascent::{Peak, PeakSearch, Peaks};
 pub use axis_distance::{AxisOptions, COVERED, axis_distance};
 pub use certificate::{Certificate, FINEST, ROUNDING, Witness, WitnessSide, certify};

@@ -16,17 +16,18 @@ use crate::sum::Sum;
 
 /// How a surface is sampled.
 ///
-/// As text: `vertices`, `auto`, `uniform:20000`, `blue:20000`, the latter two with an optional seed as
-/// in `blue:20000:7`.
+/// As text: `conforming`, `vertices`, `uniform:20000`, `blue:20000`, the latter two with an optional seed
+/// as in `blue:20000:7`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum Sampling {
     /// The vertices of the mesh, unaltered.
     #[default]
     MeshVertices,
-    /// The vertices of the mesh, and points that are added until the medial mesh is right: by
-    /// [`Shape`](crate::shape::Shape), which knows it. To [`sample`] alone these are the vertices.
-    Auto,
+    /// The vertices of the mesh, and points that are added until their Delaunay triangulation contains the
+    /// surface: by [`Shape`](crate::shape::Shape), which triangulates them. To [`sample`] alone these are
+    /// the vertices.
+    Conforming,
     /// Independent points, uniformly distributed by area.
     AreaUniform {
         /// Number of points.
@@ -47,8 +48,8 @@ pub enum Sampling {
 /// A text that names no sampling.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{0:?} is no sampling; use vertices, auto, uniform:COUNT or blue:COUNT, with an optional \
-     :SEED, and a count from 1 to 10000000, of blue noise to 1000000"
+    "{0:?} is no sampling; use conforming, vertices, uniform:COUNT or blue:COUNT, with an \
+     optional :SEED, and a count from 1 to 10000000, of blue noise to 1000000"
 )]
 pub struct ParseSamplingError(String);
 
@@ -67,8 +68,8 @@ impl FromStr for Sampling {
         if text == "vertices" {
             return Ok(Self::MeshVertices);
         }
-        if text == "auto" {
-            return Ok(Self::Auto);
+        if text == "conforming" {
+            return Ok(Self::Conforming);
         }
         // Only now: the two kinds above have no count.
         let count = parts.next().and_then(|c| c.parse().ok()).ok_or_else(error)?;
@@ -87,7 +88,7 @@ impl Sampling {
     /// own, as the vertices have. `count` is at least 1.
     pub fn with_count(self, count: usize) -> Self {
         match self {
-            Self::MeshVertices | Self::Auto => Self::BlueNoise { count, seed: 0 },
+            Self::Conforming | Self::MeshVertices => Self::BlueNoise { count, seed: 0 },
             Self::AreaUniform { seed, .. } => Self::AreaUniform { count, seed },
             Self::BlueNoise { seed, .. } => Self::BlueNoise { count, seed },
         }
@@ -96,7 +97,7 @@ impl Sampling {
     /// The same sampling with another seed.
     pub fn with_seed(self, seed: u64) -> Self {
         match self {
-            Self::MeshVertices | Self::Auto => self,
+            Self::Conforming | Self::MeshVertices => self,
             Self::AreaUniform { count, .. } => Self::AreaUniform { count, seed },
             Self::BlueNoise { count, .. } => Self::BlueNoise { count, seed },
         }
@@ -121,7 +122,7 @@ impl fmt::Display for Sampling {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (kind, count, seed) = match *self {
             Self::MeshVertices => return f.write_str("vertices"),
-            Self::Auto => return f.write_str("auto"),
+            Self::Conforming => return f.write_str("conforming"),
             Self::AreaUniform { count, seed } => ("uniform", count, seed),
             Self::BlueNoise { count, seed } => ("blue", count, seed),
         };
@@ -134,7 +135,7 @@ impl fmt::Display for Sampling {
 const CANDIDATES: usize = 5;
 
 /// Samples a surface. Exactly as many points as asked, in the unit of the mesh; none if the mesh
-/// has no area. [`Sampling::Auto`] gives the vertices.
+/// has no area. [`Sampling::Conforming`] gives the vertices.
 ///
 /// # Panics
 /// If a face names a vertex that does not exist.
@@ -152,7 +153,7 @@ const CANDIDATES: usize = 5;
 /// ```
 pub fn sample(mesh: &TriMesh, sampling: &Sampling) -> Vec<Vec3> {
     match *sampling {
-        Sampling::MeshVertices | Sampling::Auto => mesh.vertices.clone(),
+        Sampling::Conforming | Sampling::MeshVertices => mesh.vertices.clone(),
         Sampling::AreaUniform { count, seed } => {
             let mut areas = Areas::new(mesh);
             areas.points(count, seed).into_iter().map(|(point, _)| point).collect()

@@ -1,5 +1,6 @@
 //! Geometry and metrics through the public interface.
 
+mod conforming;
 mod corpus;
 mod metric_distances;
 mod metric_invariance;

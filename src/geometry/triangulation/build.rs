@@ -28,7 +28,8 @@ use crate::predicates::{
     sites_collinear,
 };
 use crate::triangulation::{
-    Cell, Division, FRONTIER, Face, INFINITE, MAX_CELLS, OPPOSITE, TriangulationError, UNUSED,
+    Cell, Division, FRONTIER, Face, INFINITE, MAX_CELLS, OPPOSITE, Triangulation,
+    TriangulationError, UNUSED,
 };
 
 /// Rounding can make an approximate walk cycle; after this many steps the exact walk takes over.
@@ -165,6 +166,18 @@ impl<'s, M: Metric> Builder<'s, M> {
             }
         }
         self.state.resize(6, UNKNOWN);
+        self.last = 1;
+    }
+
+    /// Takes the cells of a triangulation whose input points are the first sites, in their order.
+    pub(super) fn resume(&mut self, old: &Triangulation) {
+        // Site numbers and records count from one.
+        let records = old.records().iter().map(|cell| Cell {
+            v: cell.v.map(|v| v.wrapping_add(1)),
+            n: cell.n.map(|face| face.moved(1)),
+        });
+        self.cells.extend(records);
+        self.state.resize(self.cells.len(), UNKNOWN);
         self.last = 1;
     }
 

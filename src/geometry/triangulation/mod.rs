@@ -115,6 +115,30 @@ fn triangulate_dividing<M: Metric>(
     Ok(Triangulated { triangulation, repeated, filter })
 }
 
+/// Adds the sites from `first` on to a triangulation of those before them.
+pub(super) fn extend<M: Metric>(
+    old: &Triangulation,
+    sites: &[Site],
+    first: usize,
+) -> Result<Triangulated, TriangulationError> {
+    if sites.len() >= MAX_CELLS {
+        return Err(TriangulationError::TooLarge { points: sites.len(), limit: MAX_CELLS });
+    }
+    let order::Order { inserted, repeated, along_curve, .. } = order::insertion_order(sites);
+    let filter = filter_of::<M>(sites);
+    let dummy = Site { p: [f64::NAN; 3], w: 0.0 };
+    let numbered: Vec<Site> = std::iter::once(dummy).chain(sites.iter().copied()).collect();
+    let mut builder = Builder::<M>::new(&numbered, filter, sites.len());
+    builder.resume(old);
+    let mut added: Vec<u32> = inserted.into_iter().filter(|&id| id as usize >= first).collect();
+    // Along the curve the walk from one to the next is short.
+    added.sort_unstable_by_key(|&id| along_curve[id as usize]);
+    builder.insert_all(added.into_iter().map(|id| id + 1))?;
+    let ids: Vec<u32> = (0..sites.len() as u32).collect();
+    let triangulation = order::freeze(builder.cells, &ids, &along_curve);
+    Ok(Triangulated { triangulation, repeated, filter })
+}
+
 /// The filter of the coarsest grid that holds all sites.
 fn filter_of<M: Metric>(sites: &[Site]) -> Filter {
     // Only differences of weights matter.

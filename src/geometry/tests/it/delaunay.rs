@@ -274,3 +274,31 @@ fn points_that_are_flat_but_for_their_exponents_take_no_longer_than_others() {
     flat.iter_mut().for_each(|p| p.z *= 1e-100);
     check(&flat);
 }
+
+#[test]
+fn points_that_are_inserted_later_give_the_same_cells() {
+    let mut rng = Pcg64::seed_from_u64(17);
+    let mut inserted = 0;
+    for _ in 0..1_000 {
+        let mut points = small_input(&mut rng);
+        points.extend((0..rng.random_range(0..60)).map(|_| in_cube(&mut rng)));
+        let first = rng.random_range(0..=points.len());
+        let Ok(mut delaunay) = Delaunay::new(&points[..first]) else { continue };
+        // In two steps, so that what is inserted is inserted into again.
+        let second = rng.random_range(first..=points.len());
+        for part in [&points[first..second], &points[second..]] {
+            delaunay.insert(part).expect("admissible points");
+            delaunay.check().expect("valid");
+        }
+        let at_once = Delaunay::new(&points).expect("the points span space");
+        assert_eq!(cell_set(&delaunay, |v| v), cell_set(&at_once, |v| v));
+        assert_eq!(delaunay.duplicates(), at_once.duplicates());
+        inserted += points.len() - first;
+    }
+    assert!(inserted > 10_000, "{inserted}");
+    let mut whole = Delaunay::new(&lattice(6, 1.0)).expect("spans space");
+    let before = cell_set(&whole, |v| v);
+    let refused = whole.insert(&[Vec3::splat(0.3), Vec3::NAN]);
+    assert!(matches!(refused, Err(TriangulationError::NotFinite { index: 1, .. })));
+    assert_eq!(cell_set(&whole, |v| v), before);
+}

@@ -1,0 +1,285 @@
+//! Starts whose topology is right by construction, on surfaces whose vertices alone give a wrong one.
+
+use std::collections::BTreeSet;
+
+use medial::Vec3;
+use medial::complex::{MedialMesh, betti};
+use medial::shape::{Shape, ShapeOptions};
+use medial::surface::{Sampling, Side, TriMesh, read, validate};
+use medial_test_support::surfaces;
+use rand::prelude::*;
+use rand_pcg::Pcg64;
+
+use crate::shapes;
+
+fn shape_of(mesh: &TriMesh, sampling: Sampling) -> Shape {
+    let report = validate(mesh).unwrap();
+    let options = ShapeOptions { sampling, ..ShapeOptions::default() };
+    Shape::new("test", mesh, report, options).unwrap()
+}
+
+/// The conforming start of a surface, which must be right. Returns the number of added points with it.
+#[track_caller]
+fn right_start(name: &str, mesh: &TriMesh) -> (usize, MedialMesh) {
+    let shape = shape_of(mesh, Sampling::Conforming);
+    let start = shape.initial().unwrap_or_else(|error| panic!("{name}: {error}"));
+    assert_eq!(shape.sampling_warning(), None, "{name}");
+    assert_eq!(Some(betti(&start)), shape.expected_betti(), "{name}");
+    start.check().unwrap_or_else(|error| panic!("{name}: {error}"));
+    let centres: Vec<Vec3> = start.spheres.iter().map(|sphere| sphere.centre).collect();
+    let sides = shape.inside_test().sides(&centres);
+    assert!(sides.iter().all(|&side| side == Side::Inside), "{name}: a centre outside");
+    let samples = shape.samples();
+    assert_eq!(samples[..mesh.vertices.len()], shape.mesh().vertices, "{name}");
+    let tree = shape.surface_tree().unwrap();
+    assert!(tree.distance_batch(&samples).iter().all(|&d| d < 2e-6), "{name}: a sample off");
+    (samples.len() - mesh.vertices.len(), (*start).clone())
+}
+
+/// Two plates with a gap between them that is narrower than they are thick, joined at one side, in as few
+/// triangles as possible.
+fn bent_plate() -> TriMesh {
+    let profile = [
+        [0.0, 0.0],
+        [1.0, 0.0],
+        [1.0, 0.1],
+        [0.1, 0.1],
+        [0.1, 0.14],
+        [1.0, 0.14],
+        [1.0, 0.24],
+        [0.0, 0.24],
+    ];
+    let at = |z: f64| profile.map(|[x, y]| Vec3::new(x, y, z));
+    let vertices = [at(0.0), at(0.8)].concat();
+    let mut faces = Vec::new();
+    for [a, b, c, d] in [[0, 1, 2, 3], [0, 3, 4, 7], [4, 5, 6, 7]] {
+        faces.extend([[a, c, b], [a, d, c]]);
+        faces.extend([[a, b, c], [a, c, d]].map(|face: [u32; 3]| face.map(|v| v + 8)));
+    }
+    for a in 0..8 {
+        let b = (a + 1) % 8;
+        faces.extend([[a, b, b + 8], [a, b + 8, a + 8]]);
+    }
+    TriMesh { vertices, faces }
+}
+
+#[test]
+fn real_meshes_have_the_topology_of_their_solids() {
+    let mut shares = Vec::new();
+    for path in surfaces() {
+        let (name, mesh) = (path.display().to_string(), read(&path).unwrap().mesh);
+        let (added, _) = right_start(&name, &mesh);
+        println!("{name}: {added} of {}", mesh.vertices.len());
+        shares.push(added as f64 / mesh.vertices.len() as f64);
+    }
+    shares.sort_by(f64::total_cmp);
+    assert!(shares.iter().all(|&share| share <= 0.5), "{shares:?}");
+}
+
+/// A wedge between two half-planes that meet at a small angle, cut off at a distance of 1.
+fn wedge(degrees: f64) -> TriMesh {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let section = [[0.0, 0.0], [1.0, 0.0], [cos, sin]];
+    let vertices = [0.0, 1.3].map(|z| section.map(|[x, y]| Vec3::new(x, y, z))).concat();
+    let mut faces = vec![[0, 2, 1], [3, 4, 5]];
+    for a in 0..3_u32 {
+        let b = (a + 1) % 3;
+        faces.extend([[a, b, b + 3], [a, b + 3, a + 3]]);
+    }
+    TriMesh { vertices, faces }
+}
+
+/// `inner` as a cavity of `outer`.
+fn hollow(outer: &TriMesh, inner: &TriMesh) -> TriMesh {
+    shapes::joined(&[outer.clone(), shapes::inverted(inner.clone())])
+}
+
+fn scaled(mesh: TriMesh, factors: Vec3) -> TriMesh {
+    shapes::moved(mesh, |p| p * factors)
+}
+
+#[test]
+fn coarse_thin_and_sharp_solids_have_their_topology() {
+    let box_of = |half: [f64; 3]| shapes::cuboid(-Vec3::from(half), Vec3::from(half));
+    let ball = |level| shapes::sphere(level);
+    let sheets = |gap: f64| {
+        let upper = shapes::cuboid(Vec3::new(0.0, 0.0, 0.1 + gap), Vec3::new(1.0, 1.0, 0.2 + gap));
+        shapes::joined(&[shapes::cuboid(Vec3::ZERO, Vec3::new(1.0, 1.0, 0.1)), upper])
+    };
+    for (name, mesh) in [
+        ("bent plate", bent_plate()),
+        ("plate", box_of([1.0, 1.0, 1e-3])),
+        ("thinner plate", box_of([1.0, 0.7, 1e-5])),
+        ("needle", box_of([1.0, 1e-3, 1e-3])),
+        ("flat ball", scaled(ball(4), Vec3::new(1.0, 1.0, 0.02))),
+        ("wedge of 5 degrees", wedge(5.0)),
+        ("wedge of 1 degree", wedge(1.0)),
+        ("nested spheres", hollow(&ball(4), &scaled(ball(3), Vec3::splat(0.9)))),
+        (
+            "a coarse sphere in a box",
+            hollow(&box_of([1.0; 3]), &scaled(ball(1), Vec3::splat(0.99))),
+        ),
+        ("a thin box in a box", hollow(&box_of([1.0; 3]), &box_of([0.99, 0.99, 0.001]))),
+        ("sheets 1e-3 apart", sheets(1e-3)),
+        ("cospherical grid", shapes::lattice_cube(8)),
+        ("torus", shapes::torus(64, 32)),
+        ("coarse torus", shapes::torus(6, 5)),
+    ] {
+        let (added, start) = right_start(name, &mesh);
+        println!("{name}: {added} added to {}, {}", mesh.vertices.len(), start.spheres.len());
+    }
+}
+
+/// Unions of random cells of a grid of random planes, without edges and vertices where they only touch.
+fn random_boxes(rng: &mut Pcg64) -> TriMesh {
+    const N: usize = 5;
+    let mut is_solid = [[[false; N + 2]; N + 2]; N + 2];
+    let density = rng.random_range(0.3..0.8);
+    let within =
+        || (1..=N).flat_map(|x| (1..=N).flat_map(move |y| (1..=N).map(move |z| [x, y, z])));
+    for [x, y, z] in within() {
+        is_solid[x][y][z] = rng.random_bool(density);
+    }
+    // Around a corner the solid and the empty cells must each hang together by their faces.
+    let is_joined = |cells: &[bool; 8], of: bool| {
+        let of: Vec<usize> = (0..8).filter(|&k| cells[k] == of).collect();
+        let mut seen: Vec<usize> = of.first().copied().into_iter().collect();
+        let mut next = 0;
+        while next < seen.len() {
+            let near = [1, 2, 4].map(|bit| seen[next] ^ bit);
+            seen.extend(
+                near.into_iter()
+                    .filter(|k| of.contains(k) && !seen.contains(k))
+                    .collect::<Vec<_>>(),
+            );
+            next += 1;
+        }
+        seen.len() == of.len()
+    };
+    loop {
+        let mut wrong = None;
+        for x in 0..=N {
+            for y in 0..=N {
+                for z in 0..=N {
+                    let at = |k: usize| [x + (k & 1), y + (k >> 1 & 1), z + (k >> 2)];
+                    let cells: [bool; 8] = std::array::from_fn(|k| {
+                        let [x, y, z] = at(k);
+                        is_solid[x][y][z]
+                    });
+                    if !is_joined(&cells, true) || !is_joined(&cells, false) {
+                        wrong = (0..8).map(at).find(|&[x, y, z]| is_solid[x][y][z]);
+                    }
+                }
+            }
+        }
+        // Cells are only removed, so this ends.
+        let Some([x, y, z]) = wrong else { break };
+        is_solid[x][y][z] = false;
+    }
+    let planes: [Vec<f64>; 3] = std::array::from_fn(|_| {
+        // Slabs from a thousandth of the others on.
+        let mut planes = vec![0.0];
+        for k in 0..N {
+            planes.push(planes[k] + 10.0_f64.powf(rng.random_range(-3.0..0.0)));
+        }
+        planes
+    });
+    let mut faces = Vec::new();
+    for cell in within() {
+        let solid = |c: [usize; 3]| is_solid[c[0]][c[1]][c[2]];
+        for axis in (0..3).filter(|_| solid(cell)) {
+            for (side, out) in [(0, -1_isize), (1, 1)] {
+                let mut other = cell;
+                other[axis] = other[axis].checked_add_signed(out).unwrap();
+                if solid(other) {
+                    continue;
+                }
+                // Corners around the side, counter-clockwise from outside.
+                let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+                let mut ring = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[du, dv]| {
+                    let mut corner = cell.map(|c| c - 1);
+                    corner[axis] += side;
+                    corner[u] += du;
+                    corner[v] += dv;
+                    ((corner[0] * (N + 1) + corner[1]) * (N + 1) + corner[2]) as u32
+                });
+                if side == 0 {
+                    ring.reverse();
+                }
+                ring.rotate_left(rng.random_range(0..4));
+                let [a, b, c, d] = ring;
+                faces.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+    }
+    let used: BTreeSet<u32> = faces.iter().flatten().copied().collect();
+    let used: Vec<u32> = used.into_iter().collect();
+    let vertices = used.iter().map(|&v| {
+        let v = v as usize;
+        let at = [v / (N + 1) / (N + 1), v / (N + 1) % (N + 1), v % (N + 1)];
+        Vec3::from(std::array::from_fn(|axis| planes[axis][at[axis]]))
+    });
+    let vertices = vertices.collect();
+    let renumbered = |v: u32| used.binary_search(&v).unwrap() as u32;
+    TriMesh { vertices, faces: faces.into_iter().map(|face| face.map(renumbered)).collect() }
+}
+
+#[test]
+fn random_solids_of_boxes_have_their_topology() {
+    let mut rng = Pcg64::seed_from_u64(11);
+    let (mut loops, mut most) = (0, 0);
+    for k in 0..60 {
+        let mut mesh = random_boxes(&mut rng);
+        if mesh.faces.is_empty() {
+            continue;
+        }
+        // Turned, their sides are flat only up to rounding; sheared, their edges are no Delaunay edges.
+        let mut number = || rng.random_range(-1.0..1.0);
+        if k % 3 == 1 {
+            let axis = Vec3::new(number(), number(), number()).normalize();
+            mesh = shapes::moved(mesh, |p| glam::DQuat::from_axis_angle(axis, 1.0) * p);
+        } else if k % 3 == 2 {
+            let [x, y, z] = [number(), number(), number()];
+            mesh = shapes::moved(mesh, |p| Vec3::new(p.x + x * p.y + y * p.z, p.y + z * p.z, p.z));
+        }
+        let (added, start) = right_start(&format!("solid {k}"), &mesh);
+        most = most.max(added);
+        loops += betti(&start)[1];
+    }
+    assert!(loops > 20 && most > 1_000, "{loops}, {most}");
+}
+
+#[test]
+fn threads_order_and_scale_change_no_decision() {
+    let mesh = shapes::moved(bent_plate(), |p| Vec3::new(p.x + 3.0 * p.y, p.y + p.z, p.z));
+    let start = |mesh: &TriMesh, threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| right_start("bent plate", mesh))
+    };
+    let (added, first) = start(&mesh, 1);
+    assert!(added > 0);
+    assert_eq!(start(&mesh, 3), (added, first.clone()));
+    // A power of two is exact. The diagonal is not, so that the last bits of normalised numbers differ otherwise.
+    assert_eq!(start(&scaled(mesh.clone(), Vec3::splat(4.0)), 2), (added, first.clone()));
+    let mut turned = mesh.clone();
+    turned.vertices.reverse();
+    let last = mesh.vertices.len() as u32 - 1;
+    turned.faces.iter_mut().for_each(|face| *face = face.map(|v| last - v));
+    turned.faces.reverse();
+    // Rounding and the order of the vertices decide ties: other points may be added, and the topology is right.
+    for other in [scaled(mesh, Vec3::splat(1.0 / 3.0)), turned] {
+        let (count, _) = start(&other, 2);
+        assert!((count as f64 / added as f64 - 1.0).abs() < 0.3, "{count} for {added}");
+    }
+}
+
+#[test]
+fn a_surface_that_crosses_itself_keeps_its_vertices_with_a_warning() {
+    let crossing =
+        shapes::joined(&[shapes::sphere(3), shapes::moved(shapes::sphere(3), |p| p + Vec3::X)]);
+    let shape = shape_of(&crossing, Sampling::Conforming);
+    shape.initial().unwrap();
+    assert_eq!(*shape.samples(), shape.mesh().vertices);
+    let warning = shape.sampling_warning().unwrap();
+    assert!(warning.contains("crosses itself"), "{warning}");
+}
