@@ -57,7 +57,7 @@ pub fn registry() -> Vec<Registered> {
             .sweep(&[1.0, 1.5, 2.0, 3.0]),
         Registered::from(qmat::method()).best_for(
             "A small number of spheres in about a second: spikes go first, and each \
-                 merged sphere is placed anew.",
+                 merged sphere is placed again.",
         ),
         Registered::from(pmat::method())
             .best_for(

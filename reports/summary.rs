@@ -339,7 +339,7 @@ pub(crate) fn native_table(
          those of the result; compare errors at equal numbers of them. Lengths in % of the \
          bounding-box diagonal.";
     Table {
-        caption: "Every method at levels of its own".to_owned(),
+        caption: "Every method at its native levels".to_owned(),
         notes: vec![how.to_owned(), note.to_owned()],
         grouped: true,
         ..rows.table

@@ -1,9 +1,9 @@
 //! One normalised input with its substrates, each built once, on demand, and timed.
 //!
-//! A [`Shape`] is a view on a store that all methods share. What is asked for through a view is
-//! remembered in it with its cost, whoever built it first, so that the record of a run names the
-//! substrates that the method used, and a filter does not look free beside a method that starts
-//! from the mesh. [`Shape::view`] opens a fresh view on the same store.
+//! A [`Shape`] is a view on a store that all methods share. A view lists each substrate
+//! that is used through it with its cost, even if another view built it. So the record of a run names
+//! the substrates of the method, and a filter does not look free next to a method that starts from the
+//! mesh. [`Shape::view`] opens a fresh view on the same store.
 
 mod balls;
 mod similarity;
@@ -43,7 +43,7 @@ pub use similarity::{Fit, FitSource, Similarity};
 /// let options = ShapeOptions { sampling: "uniform:300".parse()?, ..ShapeOptions::default() };
 /// let shape = Shape::new("tetrahedron", &loaded.mesh, loaded.report, options)?;
 /// assert_eq!(shape.samples().len(), 300);
-/// // Built now, and once: a second view finds it there, and is told what it cost.
+/// // Built now, and once: a second view finds it there, with its cost.
 /// let (first, second) = (shape.view(), shape.view());
 /// first.delaunay()?;
 /// second.delaunay()?;
@@ -52,7 +52,7 @@ pub use similarity::{Fit, FitSource, Similarity};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
-/// A clone is the same view: what is used through either counts for both.
+/// A clone is the same view: a use through either counts for both.
 #[derive(Clone)]
 pub struct Shape {
     store: Arc<Store>,
@@ -83,7 +83,7 @@ struct Store {
 /// The part that depends on the samples.
 #[derive(Default)]
 struct OfSamples {
-    /// Whether it is no substrate that methods share, but the work of the method that asked for it.
+    /// Whether the cost is work of the method that requests it, rather than of shared substrates.
     is_of_asker: bool,
     samples: Cache<Sampling, Arc<[Vec3]>>,
     delaunay: Cache<Sampling, Arc<Triangulated>>,
@@ -169,7 +169,7 @@ impl Shape {
         Ok(Self { store: Arc::new(store), used: Arc::default(), given: None })
     }
 
-    /// The shape with an initial medial mesh from elsewhere, in input units, in place of its own.
+    /// The shape with another initial medial mesh, in input units.
     /// [`Shape::initial`] refuses one without a sphere, and one that is not valid once normalised.
     pub fn with_initial(mut self, initial: &MedialMesh) -> Self {
         let to_normal = self.store.normalisation;
@@ -183,7 +183,7 @@ impl Shape {
     }
 
     /// The same surface with other samples, for a method whose level is the density of samples. The
-    /// bounding-volume tree and the inside test are shared; all else is built anew, kept as long as
+    /// bounding-volume tree and the inside test are shared; all else is built again, kept as long as
     /// this shape, and part of the work of the method that asks for it: seconds and memory both. A
     /// given medial mesh is left behind.
     pub fn resampled(&self, sampling: Sampling) -> Self {
@@ -205,8 +205,8 @@ impl Shape {
         Self { used: Arc::default(), ..self.clone() }
     }
 
-    /// The shape with an initial medial mesh in place of its own, in normalised units, on behalf of
-    /// this view: what is used through it counts as used here.
+    /// The shape with another initial medial mesh, in normalised units, on behalf of this view: a use
+    /// through it counts as used here.
     ///
     /// # Errors
     /// [`ShapeError::EmptyInitial`] for one without a sphere.
@@ -247,7 +247,7 @@ impl Shape {
         &self.store.options
     }
 
-    /// The substrates used through this view and what each cost, whoever built it.
+    /// The substrates used through this view with their costs, even if another view built them.
     pub fn used(&self) -> Vec<(Substrate, Cost)> {
         let used = self.used.lock().expect("no panic while held");
         used.iter().map(|(&substrate, used)| (substrate, used.cost)).collect()
@@ -272,7 +272,7 @@ impl Shape {
 
     fn note(&self, substrate: Substrate, used: Use) {
         let mut all = self.used.lock().expect("no panic while held");
-        // The first use tells whether it was built here.
+        // The first use decides whether it was built here.
         all.entry(substrate).or_insert(used);
     }
 }
@@ -304,7 +304,7 @@ pub enum ShapeError {
     /// The inside of the shape holds Voronoi vertices, but all too close to the surface.
     #[error(
         "the initial medial mesh is empty: the circumcentres inside the surface ({centres}) are \
-         all within a billionth of its diagonal of it; what is so thin or small beside the whole \
+         all within a billionth of its diagonal of it; parts so thin or small relative to the whole \
          cannot be resolved: put parts that are far apart into files of their own"
     )]
     BelowResolution {
@@ -383,7 +383,7 @@ impl Cost {
     }
 
     /// As [`Cost::of`], for a substrate: what it needs while it is built counts as its own, not as
-    /// that of the work that asked for it.
+    /// that of the work that requests it.
     fn of_substrate<T>(work: impl FnOnce() -> T) -> (T, Self) {
         Self::clocked(|| usage_apart(work))
     }
@@ -437,7 +437,7 @@ impl<K: Eq + Hash, T: Clone> Cache<K, T> {
     }
 
     /// The value for a key; a second asker waits for the first. `is_of_asker`: what building needs of
-    /// the heap is part of the work that asked for it.
+    /// the heap is part of the work that requests it.
     pub fn get(
         &self,
         key: K,
@@ -581,7 +581,7 @@ impl Shape {
         self.take(Substrate::MedialMesh, built)
     }
 
-    /// The balls whose union stands for the shape, in normalised units: the spheres of the given
+    /// The balls whose union approximates the shape, in normalised units: the spheres of the given
     /// medial mesh, or the inner polar balls of the samples.
     ///
     /// # Errors
@@ -625,7 +625,7 @@ impl Shape {
 
     /// The contact points of each sphere of a medial mesh of this shape: those that it carries, or
     /// the samples nearest to the centre, to within a thousandth, where they are within
-    /// `(1 + 1e-3) r`; which is then said in `diagnostics`.
+    /// `(1 + 1e-3) r`; which `diagnostics` then reports.
     ///
     /// # Errors
     /// Never at present; reserved for samplings that can fail.
@@ -666,7 +666,7 @@ impl Shape {
     }
 
     /// A judge of medial meshes of this shape. `axis` is its exactly known medial axis, in input
-    /// units. What the judge needs counts as nobody's use.
+    /// units. The substrates of the judge count as used by no method.
     ///
     /// # Errors
     /// When the surface has no face.

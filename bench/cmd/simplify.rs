@@ -141,7 +141,9 @@ fn topology_warnings(result: &MedialMesh, shape: &Shape) -> Vec<String> {
     let initial = shape.initial().ok();
     let start = initial.and_then(|initial| topology_warning(complex::betti(&initial), expected));
     let start = start.map(|start| {
-        format!("the initial medial mesh is not right either ({start}); try `--sampling conforming`")
+        format!(
+            "the initial medial mesh is not right either ({start}); try `--sampling conforming`"
+        )
     });
     [Some(format!("the topology differs from the solid's: {own}")), start]
         .into_iter()

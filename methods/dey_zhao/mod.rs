@@ -135,7 +135,7 @@ pub fn method() -> Method<DeyZhaoParams> {
         )
         .bibtex(crate::references(&["DeyZhao2002"]))
         .summary(
-            "Keeps the Voronoi facets whose Delaunay edge is steep to the surface, or long beside \
+            "Keeps the Voronoi facets whose Delaunay edge is steep to the surface, or long next to \
              the samples' spacing.",
         )
         .native(NativeLevel::larger_is_coarser(

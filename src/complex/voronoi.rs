@@ -90,13 +90,13 @@ impl CellSpheres {
         surface: &TriangleBvh,
     ) -> Self {
         let circumspheres = delaunay.circumspheres();
-        let asked: Vec<u32> =
+        let known: Vec<u32> =
             (0..).zip(&is_inside).filter(|(_, inside)| **inside).map(|(c, _)| c).collect();
         // A sphere that is not representable is as wrong as one that is centred outside.
         let centre = |cell: u32| circumspheres[cell as usize].map_or(Vec3::INFINITY, |s| s.centre);
-        let centres: Vec<Vec3> = asked.iter().map(|&cell| centre(cell)).collect();
+        let centres: Vec<Vec3> = known.iter().map(|&cell| centre(cell)).collect();
         let sides = inside.sides(&centres);
-        let moved: Vec<(CellId, Sphere)> = (asked.par_iter().zip(&sides).zip(&centres))
+        let moved: Vec<(CellId, Sphere)> = (known.par_iter().zip(&sides).zip(&centres))
             .filter(|&((_, &side), &centre)| {
                 side != Side::Inside || surface.any_within(centre, GUARD_BAND)
             })

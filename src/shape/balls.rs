@@ -11,7 +11,7 @@ use crate::geometry::{Delaunay, Poles, Sphere};
 use crate::shape::{Shape, ShapeError};
 use crate::surface::Side;
 
-/// Balls whose union stands for a shape.
+/// Balls whose union approximates a shape.
 ///
 /// N. Amenta, S. Choi, R. K. Kolluri: *The power crust, unions of balls, and the medial axis
 /// transform*, Computational Geometry 19 (2001), <https://doi.org/10.1016/S0925-7721(01)00017-7>.
@@ -156,7 +156,7 @@ impl Shape {
     /// The polar balls of the samples, in normalised units: no pole is at infinity, because the
     /// corners of a large box around the surface take part in the diagram. Their own poles do not count.
     ///
-    /// Costs a Delaunay triangulation of its own.
+    /// Costs one more Delaunay triangulation.
     ///
     /// # Errors
     /// When the samples do not span space.

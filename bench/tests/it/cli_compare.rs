@@ -85,7 +85,7 @@ fn native_levels_bounds_chains_and_the_start_are_rows() {
     assert_eq!(chain["simplify"]["spheres"], 40);
     assert!(chain["simplify"]["warnings"].to_string().contains("to start from"), "{chain}");
     let page = fs::read_to_string(at("report/index.html")).expect("a page");
-    for text in ["Equal error", "levels of its own", "angle+qmat", "theta"] {
+    for text in ["Equal error", "native levels", "angle+qmat", "theta"] {
         assert!(page.contains(text), "{text}");
     }
 }
