@@ -69,7 +69,6 @@ fn real_meshes_have_the_topology_of_their_solids() {
     for path in surfaces() {
         let (name, mesh) = (path.display().to_string(), read(&path).unwrap().mesh);
         let (added, _) = right_start(&name, &mesh);
-        println!("{name}: {added} of {}", mesh.vertices.len());
         shares.push(added as f64 / mesh.vertices.len() as f64);
     }
     shares.sort_by(f64::total_cmp);
@@ -125,8 +124,7 @@ fn coarse_thin_and_sharp_solids_have_their_topology() {
         ("torus", shapes::torus(64, 32)),
         ("coarse torus", shapes::torus(6, 5)),
     ] {
-        let (added, start) = right_start(name, &mesh);
-        println!("{name}: {added} added to {}, {}", mesh.vertices.len(), start.spheres.len());
+        right_start(name, &mesh);
     }
 }
 
