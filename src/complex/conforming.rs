@@ -59,6 +59,10 @@ const FLAT: [f64; 2] = [1e-6, 1e-10];
 /// The least share of a segment that a split cuts off.
 const SHORTEST: f64 = 0.2;
 
+/// A segment waits for the next round if a point of this round is within this share of its length of its middle: the less, the
+/// fewer rounds and the more points.
+const NEAR: f64 = 0.25;
+
 /// A triangulation of the samples of a surface that contains the surface.
 #[derive(Clone, Debug)]
 pub struct Conforming {
@@ -123,7 +127,8 @@ impl Conforming {
         let mut rounds = 0;
         let mut missing = skin.missing(&delaunay);
         loop {
-            skin.flip_to(&missing, &delaunay);
+            let mut stars = Stars::of(&delaunay);
+            skin.flip_to(&missing, &mut stars);
             let suspects = skin.with_changed(missing);
             missing = skin.missing_among(suspects, &delaunay);
             if missing.is_empty() {
@@ -134,7 +139,7 @@ impl Conforming {
                 return Err(ConformingError::Budget { missing: missing.len(), added, most });
             }
             let before = skin.points.len();
-            skin.refine(&missing, &delaunay);
+            skin.refine(&missing, &mut stars);
             if skin.points.len() == before {
                 return Err(ConformingError::Budget { missing: missing.len(), added, most });
             }
@@ -353,15 +358,15 @@ impl Skin {
     }
 
     /// Flips diagonals that are no Delaunay edges to those that are.
-    fn flip_to(&mut self, missing: &[u32], delaunay: &Delaunay) {
+    fn flip_to(&mut self, missing: &[u32], stars: &mut Stars<'_>) {
         for &t in missing {
             for edge in sides(self.triangles[t as usize]) {
-                if self.is_segment(t, edge) || has_edge(delaunay, edge) {
+                if self.is_segment(t, edge) || stars.has_edge(edge) {
                     continue;
                 }
                 let diagonal = [t, self.beyond(edge)].map(|s| self.opposite(s, edge));
                 // One edge more that is there: this ends.
-                if has_edge(delaunay, diagonal) && self.flip(edge).is_some() {
+                if stars.has_edge(diagonal) && self.flip(edge).is_some() {
                     break;
                 }
             }
@@ -415,13 +420,13 @@ impl Skin {
     }
 
     /// Steps 2 and 3: adds points for the missing triangles, and splits the surface at them.
-    fn refine(&mut self, missing: &[u32], delaunay: &Delaunay) {
+    fn refine(&mut self, missing: &[u32], stars: &mut Stars<'_>) {
         let mut split = Vec::new();
         let mut whole = Vec::new();
         for &t in missing {
             let before = split.len();
             for edge in sides(self.triangles[t as usize]) {
-                if self.is_segment(t, edge) && !has_edge(delaunay, edge) {
+                if self.is_segment(t, edge) && !stars.has_edge(edge) {
                     split.push(ascending(edge));
                 }
             }
@@ -431,7 +436,7 @@ impl Skin {
         }
         split.sort_unstable();
         split.dedup();
-        // The shortest first. A longer one that has a point of this round in its smallest sphere waits for the next.
+        // The shortest first. A longer one with a point of this round near its middle waits for the next.
         let half =
             |[a, b]: [u32; 2]| 0.5 * self.points[a as usize].distance(self.points[b as usize]);
         split.sort_by(|&e, &f| half(e).total_cmp(&half(f)).then(e.cmp(&f)));
@@ -443,8 +448,8 @@ impl Skin {
         }
         for edge in split {
             let [p, q] = edge.map(|v| self.points[v as usize]);
-            if !fresh.any_within(p.midpoint(q), 0.5 * p.distance(q)) {
-                let at = self.point_of_segment(edge, delaunay);
+            if !fresh.any_within(p.midpoint(q), NEAR * p.distance(q)) {
+                let at = self.point_of_segment(edge, stars);
                 self.split_edge(edge, at);
                 fresh.insert(at);
             }
@@ -470,7 +475,7 @@ impl Skin {
                     if !cut.insert(ascending(edge)) {
                         continue;
                     }
-                    let at = self.point_of_segment(edge, delaunay);
+                    let at = self.point_of_segment(edge, stars);
                     self.split_edge(edge, at);
                     at
                 }
@@ -489,13 +494,15 @@ impl Skin {
 
     /// Where a segment is split: as far from one end as the vertex that encroaches upon it most, if that is
     /// nearer to this end than the middle.
-    fn point_of_segment(&self, [a, b]: [u32; 2], delaunay: &Delaunay) -> Vec3 {
+    fn point_of_segment(&self, [a, b]: [u32; 2], stars: &mut Stars<'_>) -> Vec3 {
         let (p, q) = (self.points[a as usize], self.points[b as usize]);
-        let known = delaunay.point_count() as u32;
-        let around = [a, b].into_iter().filter(|&v| v < known).flat_map(|v| star(delaunay, v));
+        let delaunay = stars.delaunay;
+        // Ends of this round are not in the triangulation.
+        let known = [a, b].into_iter().filter(|&v| v < delaunay.point_count() as u32);
+        let around: Vec<CellId> = known.flat_map(|v| stars.around(v).to_vec()).collect();
         // The largest angle over the segment: above a right angle it is inside its smallest sphere.
         let mut most: Option<(f64, Vec3)> = None;
-        for v in around.flat_map(|cell| delaunay.vertices(cell)) {
+        for v in around.into_iter().flat_map(|cell| delaunay.vertices(cell)) {
             if v == VertexId::INFINITE || v.0 == a || v.0 == b {
                 continue;
             }
@@ -710,9 +717,26 @@ fn star(triangulation: &Triangulation, vertex: u32) -> Vec<CellId> {
     star
 }
 
-fn has_edge(triangulation: &Triangulation, [a, b]: [u32; 2]) -> bool {
-    let around = star(triangulation, a);
-    around.iter().any(|&cell| triangulation.vertices(cell).contains(&VertexId(b)))
+/// The cells around vertices of a triangulation, each searched once.
+struct Stars<'d> {
+    delaunay: &'d Delaunay,
+    /// Looked up, never iterated.
+    known: HashMap<u32, Vec<CellId>>,
+}
+
+impl<'d> Stars<'d> {
+    fn of(delaunay: &'d Delaunay) -> Self {
+        Self { delaunay, known: HashMap::new() }
+    }
+
+    fn around(&mut self, vertex: u32) -> &[CellId] {
+        self.known.entry(vertex).or_insert_with(|| star(self.delaunay, vertex))
+    }
+
+    fn has_edge(&mut self, [a, b]: [u32; 2]) -> bool {
+        let delaunay = self.delaunay;
+        self.around(a).iter().any(|&cell| delaunay.vertices(cell).contains(&VertexId(b)))
+    }
 }
 
 /// Centre and radius of the circle through three points; the middle of the longest side where there is none.
