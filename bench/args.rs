@@ -109,7 +109,7 @@ impl SubstrateArguments {
 #[derive(Clone, Debug, Args)]
 pub struct MeasureArguments {
     /// Measure errors at N surface samples in addition to the vertices, and at N samples of the
-    /// reconstruction [default: 50000, `compare` 10000].
+    /// reconstruction [default: 50000 for one mesh, 10000 in `compare`].
     #[arg(
         long,
         value_name = "N",
