@@ -1,4 +1,4 @@
-//! A Delaunay triangulation that contains the surface of a solid, and so tells its inside exactly.
+//! A Delaunay triangulation that contains the surface of a solid, and so separates inside from outside exactly.
 //!
 //! If every triangle of the surface is a facet of the Delaunay triangulation of its vertices, the cells
 //! inside are a triangulation of the solid with all vertices on its boundary. Their dual complex is a
@@ -333,7 +333,7 @@ impl Skin {
     }
 
     /// Flips the diagonals of patches until opposite angles add up to two right angles at most.
-    // Nearly every triangle is a patch of its own, and has nothing to flip.
+    // Nearly every patch is a single triangle, without a diagonal to flip.
     fn flip_by_angles(&mut self, triangles: impl IntoIterator<Item = usize>) {
         let mut waiting: Vec<u32> = triangles.into_iter().map(|t| t as u32).collect();
         while let Some(t) = waiting.pop() {

@@ -284,7 +284,7 @@ fn points_that_are_inserted_later_give_the_same_cells() {
         points.extend((0..rng.random_range(0..60)).map(|_| in_cube(&mut rng)));
         let first = rng.random_range(0..=points.len());
         let Ok(mut delaunay) = Delaunay::new(&points[..first]) else { continue };
-        // In two steps, so that what is inserted is inserted into again.
+        // In two steps: the second inserts into a result of the first.
         let second = rng.random_range(first..=points.len());
         for part in [&points[first..second], &points[second..]] {
             delaunay.insert(part).expect("admissible points");
