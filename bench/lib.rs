@@ -2,11 +2,17 @@
 //!
 //! Another crate gets the whole command, with its methods added to the built-in ones, by [`main_with`].
 //!
-//! The modules from low to high: [`host`], the process of the command; [`process_tree`], which ends child processes;
-//! [`plugin`], methods as external programs; [`check`], the conformance corpus; [`study`], the items to run; [`measure`],
-//! from an output to its record; [`store`], the folder of records; [`exec`], the workers; [`rebuild`], the report of a
-//! store. Verbs share [`args`], [`exit`], [`output`], [`files`] and [`interrupt`]. [`cmd`] has one file for each verb,
-//! and [`cli`] lists them.
+//! The modules from low to high:
+//!
+//! | module | content |
+//! |---|---|
+//! | [`host`], [`process_tree`] | the process of the command, the end of child processes |
+//! | [`plugin`], [`check`] | methods as external programs, the conformance tests |
+//! | [`study`], [`measure`] | the items to run, from an output to its record |
+//! | [`store`], [`exec`] | the folder of records, the workers |
+//! | [`rebuild`] | the report of a store |
+//! | [`args`], [`exit`], [`output`], [`files`], [`interrupt`] | shared by the verbs |
+//! | [`cmd`], [`cli`] | one file for each verb, their list |
 
 pub mod args;
 pub mod check;

@@ -15,8 +15,8 @@
 //! * D. Cohen-Steiner, E. Colin de Verdiere, M. Yvinec 2002, *Conforming Delaunay triangulations in 3D*,
 //!   SoCG, <https://doi.org/10.1145/513400.513425>: the problem for surfaces in space.
 //!
-//! 1. Neighbours in one plane, to within a millionth of the diagonal, are merged into *patches*. Within a patch any diagonal will do, and edges
-//!    are flipped to those of the triangulation.
+//! 1. Neighbours in one plane, to within a millionth of the diagonal, are merged into *patches*. Within a
+//!    patch any diagonal will do, and edges are flipped to those of the triangulation.
 //! 2. A *segment*, an edge between two patches, that is no Delaunay edge is split. The vertex that sees it under
 //!    the largest angle decides where: as far from the nearer end as that vertex is, so that it does not encroach upon
 //!    the piece, or in the middle. In a round shorter segments come first, and longer ones near their points wait.
@@ -30,7 +30,7 @@
 //! There are no protecting balls around segments, so that the refinement need not end where facets meet at
 //! small angles. It is given up beyond a budget. No piece of a segment is shorter than a fifth of it. A
 //! circumcentre that encroaches upon a segment without being beyond it is inserted all the same: what that
-//! breaks is mended in the next round. Points are rounded, so that a split triangle is flat only up to
+//! breaks is repaired in the next round. Points are rounded, so that a split triangle is flat only up to
 //! rounding; the triangulation is that of the rounded points, exactly.
 
 use std::collections::{HashMap, HashSet};
@@ -52,15 +52,22 @@ const ROUNDS: usize = 1_000;
 /// inserted, in radians; below it the triangulation decides.
 const COCIRCULAR: f64 = 1e-9;
 
-/// Neighbouring triangles are one patch if they are within this of one plane, as a fraction of the diagonal. Many files have
-/// six digits. The second value is for surfaces with details of the size of the first.
+/// Neighbouring triangles are one patch if they are within this of one plane, as a fraction of the
+/// diagonal. Many files have six digits. The second value is for details of the size of the first.
 const FLAT: [f64; 2] = [1e-6, 1e-10];
+
+/// A cell is flat if six times its volume is at most this share of the cube of its longest edge.
+const FLAT_CELL: f64 = 1e-3;
+
+/// Flips for each triangle of a call at most. Triangles of a patch are flat only up to rounding, for which
+/// the proof that flipping ends does not hold.
+const FLIPS: usize = 100;
 
 /// The least share of a segment that a split cuts off.
 const SHORTEST: f64 = 0.2;
 
-/// A segment waits for the next round if a point of this round is within this share of its length of its middle: the less, the
-/// fewer rounds and the more points.
+/// A segment waits for the next round if a point of this round is within this share of its length of its
+/// middle. A smaller share gives fewer rounds and more points.
 const NEAR: f64 = 0.25;
 
 /// A triangulation of the samples of a surface that contains the surface.
@@ -101,8 +108,9 @@ pub enum ConformingError {
 }
 
 impl Conforming {
-    /// Refines a closed, oriented surface until the Delaunay triangulation of its samples contains it. At most
-    /// `most` points are added. The same result for any number of threads. Expected `O(n log n)`.
+    /// Refines a closed, oriented surface until the Delaunay triangulation of its samples contains it. No
+    /// round begins after `most` points were added. The same result for any number of threads. Cost:
+    /// `O(n log n)` expected, and `O(n)` for each round.
     ///
     /// # Errors
     /// When the vertices do not span space, the surface touches or crosses itself, or the points do not
@@ -112,8 +120,11 @@ impl Conforming {
     /// If a face names a vertex that does not exist.
     pub fn new(surface: &TriMesh, most: usize) -> Result<Self, ConformingError> {
         let delaunay = Delaunay::new(&surface.vertices)?;
-        Self::refined(surface, delaunay.clone(), most, FLAT[0])
-            .or_else(|_| Self::refined(surface, delaunay, most, FLAT[1]))
+        match Self::refined(surface, delaunay.clone(), most, FLAT[0]) {
+            // Flips within the tolerance can make close sheets cross.
+            Err(ConformingError::Crossing) => Self::refined(surface, delaunay, most, FLAT[1]),
+            found => found,
+        }
     }
 
     fn refined(
@@ -336,7 +347,8 @@ impl Skin {
     // Nearly every patch is a single triangle, without a diagonal to flip.
     fn flip_by_angles(&mut self, triangles: impl IntoIterator<Item = usize>) {
         let mut waiting: Vec<u32> = triangles.into_iter().map(|t| t as u32).collect();
-        while let Some(t) = waiting.pop() {
+        let mut left = FLIPS * waiting.len();
+        while let Some(t) = waiting.pop().filter(|_| left > 0) {
             for edge in sides(self.triangles[t as usize]) {
                 if self.is_segment(t, edge) {
                     continue;
@@ -351,6 +363,7 @@ impl Skin {
                     && let Some(pair) = self.flip(edge)
                 {
                     waiting.extend(pair);
+                    left -= 1;
                     break;
                 }
             }
@@ -623,7 +636,7 @@ fn peel(delaunay: &Delaunay, is_inside: &mut [bool], walls: &mut [[Option<u32>; 
     while let Some(cell) = waiting.pop() {
         let of_patch: Vec<u32> = walls[cell.index()].iter().copied().flatten().collect();
         let &[patch, other] = &of_patch[..] else { continue };
-        if patch != other || !is_inside[cell.index()] {
+        if patch != other || !is_inside[cell.index()] || !is_flat(delaunay, cell) {
             continue;
         }
         is_inside[cell.index()] = false;
@@ -669,6 +682,14 @@ impl PointGrid {
             .flat_map(|[x, y]| (low[2]..=high[2]).map(move |z| [x, y, z]));
         cells.filter_map(|cell| self.by_cell.get(&cell)).flatten().any(is_within)
     }
+}
+
+/// Details as small as the tolerance of patches have two facets in one without being flat.
+fn is_flat(delaunay: &Delaunay, cell: CellId) -> bool {
+    let [a, b, c, d] = delaunay.vertices(cell).map(|v| delaunay.point(v));
+    let edges = [a - b, a - c, a - d, b - c, b - d, c - d];
+    let longest = edges.into_iter().map(Vec3::length).fold(0.0, f64::max);
+    (b - a).cross(c - a).dot(d - a).abs() <= FLAT_CELL * longest.powi(3)
 }
 
 fn sides([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {

@@ -9,6 +9,9 @@
 //! 3. Each Delaunay edge all of whose cells are finite and inside has a convex planar Voronoi
 //!    polygon, which is triangulated ([`DualTriangulation`]).
 //!
+//! In a triangulation that contains the surface ([`Conforming`](super::Conforming)) *inside* is the place of
+//! the cell, and a centre outside is moved into its cell.
+//!
 //! Coincident circumcentres are not merged: merging by position can close loops, and the published
 //! counts are those without merging.
 

@@ -101,6 +101,7 @@ fn scaled(mesh: TriMesh, factors: Vec3) -> TriMesh {
 fn coarse_thin_and_sharp_solids_have_their_topology() {
     let box_of = |half: [f64; 3]| shapes::cuboid(-Vec3::from(half), Vec3::from(half));
     let ball = |level| shapes::sphere(level);
+    let small = |size: f64| shapes::moved(ball(2), |p| size * p + Vec3::new(3.0, 0.0, 0.0));
     let sheets = |gap: f64| {
         let upper = shapes::cuboid(Vec3::new(0.0, 0.0, 0.1 + gap), Vec3::new(1.0, 1.0, 0.2 + gap));
         shapes::joined(&[shapes::cuboid(Vec3::ZERO, Vec3::new(1.0, 1.0, 0.1)), upper])
@@ -120,6 +121,9 @@ fn coarse_thin_and_sharp_solids_have_their_topology() {
         ),
         ("a thin box in a box", hollow(&box_of([1.0; 3]), &box_of([0.99, 0.99, 0.001]))),
         ("sheets 1e-3 apart", sheets(1e-3)),
+        ("sheets 1e-6 apart", sheets(1e-6)),
+        ("a ball of a millionth", shapes::joined(&[ball(3), small(1e-6)])),
+        ("a ball of a ten-millionth", shapes::joined(&[ball(3), small(1e-7)])),
         ("cospherical grid", shapes::lattice_cube(8)),
         ("torus", shapes::torus(64, 32)),
         ("coarse torus", shapes::torus(6, 5)),
