@@ -53,8 +53,8 @@ impl Global {
 /// How the substrates of a shape are built.
 #[derive(Clone, Debug, Args)]
 pub struct SubstrateArguments {
-    /// Boundary samples: `vertices`, `conforming` (with points that make the topology right), `uniform:COUNT`
-    /// or `blue:COUNT` [default: vertices].
+    /// Boundary samples: `conforming` (the vertices, with points that make the topology right), `vertices`
+    /// (as in the papers), `uniform:COUNT` or `blue:COUNT` [default: conforming].
     #[arg(long, value_name = "SAMPLING")]
     pub sampling: Option<String>,
     /// Triangulation of the dual Voronoi polygons [default: fan].

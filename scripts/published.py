@@ -137,7 +137,8 @@ PAPERS = {
 def run(paper, name, number, options):
     label, mesh, samples, methods, _ = paper["rows"][number]
     source = mesh if mesh.startswith("builtin:") else str((options.meshes / mesh).absolute())
-    sampling = f"sampling = 'blue:{samples}'\n" if samples else ""
+    # Papers start from the vertices alone.
+    sampling = f"sampling = '{f'blue:{samples}' if samples else 'vertices'}'\n"
     folder = options.out / f"{name}-{number}"
     study = options.out / f"{name}-{number}.toml"
     options.out.mkdir(parents=True, exist_ok=True)

@@ -88,6 +88,7 @@ struct OfSamples {
     samples: Cache<Sampling, Arc<[Vec3]>>,
     delaunay: Cache<Sampling, Arc<Triangulated>>,
     cells: Cache<Sampling, Arc<CellSpheres>>,
+    centred: Cache<Sampling, Arc<CellSpheres>>,
     facets: Cache<Sampling, Arc<VoronoiFacets>>,
     medial: Cache<Sampling, Arc<MedialMesh>>,
     balls: Cache<Sampling, Arc<InnerBalls>>,
@@ -545,6 +546,24 @@ impl Shape {
         self.take(Substrate::Inside, built)
     }
 
+    /// As [`Shape::cells`], but by the place of the circumcentres alone, as poles need it.
+    ///
+    /// # Errors
+    /// When the samples do not span space.
+    pub fn centred(&self) -> Result<Arc<CellSpheres>, ShapeError> {
+        let triangulated = self.triangulated()?;
+        if triangulated.is_inside.is_err() {
+            return self.cells();
+        }
+        let tree = self.surface_tree()?;
+        let inside = self.inside_test();
+        let built = self.built(
+            |of_samples| &of_samples.centred,
+            || Ok(Arc::new(CellSpheres::classify(&triangulated.delaunay, &inside, &tree))),
+        );
+        self.take(Substrate::Inside, built)
+    }
+
     /// The Voronoi facets all of whose vertices are inside.
     ///
     /// # Errors
@@ -592,7 +611,7 @@ impl Shape {
             return given.as_ref().map(|m| Arc::new(InnerBalls::of_mesh(m))).map_err(Clone::clone);
         }
         let delaunay = self.delaunay()?;
-        let cells = self.cells()?;
+        let cells = self.centred()?;
         let built = self.built(
             |of_samples| &of_samples.balls,
             || {

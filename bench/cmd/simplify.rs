@@ -7,7 +7,7 @@ use medial::complex::MedialMesh;
 use medial::metrics::topology_warning;
 use medial::shape::Shape;
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
-use medial::surface::TriMesh;
+use medial::surface::{Sampling, TriMesh};
 use medial::{complex, surface};
 use medial_methods::aof::LatticeVoxels;
 use medial_methods::tam_heidrich::{OuterPoles, PartInfo, RemainingPoles};
@@ -140,11 +140,13 @@ fn topology_warnings(result: &MedialMesh, shape: &Shape) -> Vec<String> {
     let Some(own) = topology_warning(complex::betti(result), expected) else { return Vec::new() };
     let initial = shape.initial().ok();
     let start = initial.and_then(|initial| topology_warning(complex::betti(&initial), expected));
-    let start = start.map(|start| {
-        format!(
-            "the initial medial mesh is not right either ({start}); try `--sampling conforming`"
-        )
-    });
+    let advice = match shape.options().sampling {
+        _ if shape.has_given_initial() => "",
+        Sampling::Conforming => "",
+        _ => "; try `--sampling conforming`",
+    };
+    let start =
+        start.map(|start| format!("the initial medial mesh is not right either ({start}){advice}"));
     [Some(format!("the topology differs from the solid's: {own}")), start]
         .into_iter()
         .flatten()

@@ -396,7 +396,7 @@ const COINCIDENT: f64 = 1e-7;
 impl DistinctBalls {
     /// Those of the samples of a shape.
     pub(super) fn of_samples(shape: &Shape) -> Result<Self, ShapeError> {
-        let (delaunay, cells) = (shape.delaunay()?, shape.cells()?);
+        let (delaunay, cells) = (shape.delaunay()?, shape.centred()?);
         let spheres = cells.circumspheres();
         let is_pole = poles(&delaunay, &cells);
         let mut found = Self::default();
@@ -483,7 +483,7 @@ fn shared_sample(
 /// samples.
 fn poles(delaunay: &Delaunay, cells: &CellSpheres) -> Vec<bool> {
     let spheres = cells.circumspheres();
-    let inside = delaunay.finite_cells().filter(|&cell| cells.is_centred_inside(cell));
+    let inside = delaunay.finite_cells().filter(|&cell| cells.is_inside(cell));
     let inside: Vec<(CellId, f64)> =
         inside.map(|cell| (cell, spheres[cell.index()].map_or(0.0, |s| s.radius))).collect();
     let mut farthest = vec![0.0_f64; delaunay.point_count()];

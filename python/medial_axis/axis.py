@@ -132,7 +132,7 @@ class MedialAxis:
         return made
 
     def of(
-        self, mesh: Mesh, *, sampling: str = "vertices", dual: str = "fan", seed: int = 0
+        self, mesh: Mesh, *, sampling: str = "conforming", dual: str = "fan", seed: int = 0
     ) -> MedialAxis:
         """The same medial mesh as one of a surface, which must have the same unit.
 

@@ -215,7 +215,7 @@ class Mesh:
     def medial_axis(
         self,
         *,
-        sampling: str = "vertices",
+        sampling: str = "conforming",
         dual: str = "fan",
         seed: int = 0,
         threads: int | None = None,
@@ -224,7 +224,8 @@ class Mesh:
         """The Voronoi medial mesh, from which methods start.
 
         Args:
-            sampling: `vertices`, `conforming` (adds points that make the topology right), `uniform:COUNT` or `blue:COUNT`.
+            sampling: `conforming` (the vertices, with points that make the topology right), `vertices`, `uniform:COUNT` or
+                `blue:COUNT`.
             dual: How Voronoi polygons are triangulated: `fan` or `delaunay`.
             seed: Seed of random samples.
             threads: Threads of a separate pool; by default all calls share one.

@@ -1,9 +1,9 @@
 #!/bin/sh
 # Every metric against an independent second opinion, in one table: sets up what it needs (Open3D and GUDHI
 # from PyPI in a virtual environment below the build folder; CGAL from Debian: libcgal-dev, libgmp-dev,
-# libmpfr-dev, g++), runs all comparisons, and writes the table to oracles.json (and, with DIR, into that
-# report) and oracles.md in the build folder's `oracles`. Missing programs count as skipped. Exit
-# codes: 0 all that ran agree, 1 some differ.
+# libmpfr-dev, g++, and tetgen), runs all comparisons, and writes the table to oracles.json (and, with DIR,
+# into that report) and oracles.md in the build folder's `oracles`. Missing programs count as skipped.
+# Exit codes: 0 all that ran agree, 1 some differ.
 #
 #   scripts/oracles/all.sh [-m MESHES] [DIR]
 #
@@ -121,7 +121,19 @@ for name in $names; do
     done
 done
 
-# 3. What the test suite compares by brute force or closed form.
+# 3. The triangulation that the initial medial mesh is made of.
+for name in $names; do
+    label=$(basename "$name")
+    if [ ! $has_python ] || ! command -v tetgen >/dev/null; then
+        say "cells inside" "TetGen -pD" "$label" "tetgen or NumPy is missing" skipped
+    elif result=$("$python" scripts/oracles/conforming.py "$medial" "$name"); then
+        say "cells inside" "TetGen -pD" "$label" "${result#*: }" yes
+    else
+        say "cells inside" "TetGen -pD" "$label" "${result#*: }" no
+    fi
+done
+
+# 4. What the test suite compares by brute force or closed form.
 while IFS='|' read -r metric oracle input; do
     say "$metric" "$oracle" "$input" "cargo test" "in the test suite"
 done <<'END'

@@ -6,7 +6,8 @@
 //! 1999, *Voronoi diagrams and Morse theory of the distance function*; Edelsbrunner's dual complexes).
 //! No centre of a ball decides anything.
 //!
-//! Where the vertices do not conform, points are added on the surface:
+//! Where the vertices do not conform, edges between neighbours nearly in one plane are flipped to those of the
+//! triangulation, as any mesher of smooth surfaces does, and points are added on the surface:
 //!
 //! * J. Ruppert 1995, *A Delaunay refinement algorithm for quality 2-dimensional mesh generation*, Journal
 //!   of Algorithms 18(3), <https://doi.org/10.1006/jagm.1995.1021>: circumcentres of triangles.
@@ -17,6 +18,9 @@
 //!
 //! 1. Neighbours in one plane, to within a millionth of the diagonal, are merged into *patches*. Within a
 //!    patch any diagonal will do, and edges are flipped to those of the triangulation.
+//!    Between patches an edge is flipped if the triangulation has the other diagonal, no two normals of the four
+//!    triangles differ by more than 30 degrees, and the surface moves by no more than 3e-3 of the diagonal.
+//!    The vertices stay where they are, and the topology of the surface as well.
 //! 2. A *segment*, an edge between two patches, that is no Delaunay edge is split. The vertex that sees it under
 //!    the largest angle decides where: as far from the nearer end as that vertex is, so that it does not encroach upon
 //!    the piece, or in the middle. In a round shorter segments come first, and longer ones near their points wait.
@@ -27,8 +31,9 @@
 //!    a flood through facets that are not on the surface. Flat cells with two facets in a patch are taken off.
 //!
 //! # Deviations from the papers
-//! There are no protecting balls around segments, so that the refinement need not end where facets meet at
-//! small angles. It is given up beyond a budget. No piece of a segment is shorter than a fifth of it. A
+//! The papers keep the surface and flip nothing between patches. On twelve real meshes flips leave a ninth of the
+//! added points or fewer (casting: 29 instead of 2,504). There are no protecting balls around segments, so that
+//! the refinement need not end where facets meet at small angles. It is given up beyond a budget. No piece of a segment is shorter than a fifth of it. A
 //! circumcentre that encroaches upon a segment without being beyond it is inserted all the same: what that
 //! breaks is repaired in the next round. Points are rounded, so that a split triangle is flat only up to
 //! rounding; the triangulation is that of the rounded points, exactly.
@@ -55,6 +60,11 @@ const COCIRCULAR: f64 = 1e-9;
 /// Neighbouring triangles are one patch if they are within this of one plane, as a fraction of the
 /// diagonal. Many files have six digits. The second value is for details of the size of the first.
 const FLAT: [f64; 2] = [1e-6, 1e-10];
+
+/// Neighbours are nearly in one plane if the cosine of the angle between their normals is at least this (30 degrees), and
+/// the two diagonals are no farther apart than this share of the diagonal of the surface.
+const STRAIGHT: f64 = 0.866;
+const BEND: f64 = 3e-3;
 
 /// A cell is flat if six times its volume is at most this share of the cube of its longest edge.
 const FLAT_CELL: f64 = 1e-3;
@@ -121,7 +131,7 @@ impl Conforming {
     pub fn new(surface: &TriMesh, most: usize) -> Result<Self, ConformingError> {
         let delaunay = Delaunay::new(&surface.vertices)?;
         match Self::refined(surface, delaunay.clone(), most, FLAT[0]) {
-            // Flips within the tolerance can make close sheets cross.
+            // Flips can make close sheets cross.
             Err(ConformingError::Crossing) => Self::refined(surface, delaunay, most, FLAT[1]),
             found => found,
         }
@@ -140,6 +150,9 @@ impl Conforming {
         loop {
             let mut stars = Stars::of(&delaunay);
             skin.flip_to(&missing, &mut stars);
+            if flat == FLAT[0] {
+                skin.flip_bent(&missing, &mut stars);
+            }
             let suspects = skin.with_changed(missing);
             missing = skin.missing_among(suspects, &delaunay);
             if missing.is_empty() {
@@ -175,6 +188,8 @@ struct Skin {
     patch: Vec<u32>,
     /// For each patch the coordinate axis along which it is projected, and the sense of its triangles there.
     plane: Vec<Option<(usize, Sign)>>,
+    /// How far apart two diagonals are at most of which one may replace the other.
+    bend: f64,
     /// The triangle of each directed edge.
     across: HashMap<u64, u32, BuildHasherDefault<KeyHasher>>,
     /// Triangles that were set since [`Skin::with_changed`].
@@ -196,6 +211,7 @@ impl Skin {
             points: surface.vertices.clone(),
             patch: vec![0; triangles.len()],
             plane: Vec::new(),
+            bend: 0.0,
             across: HashMap::with_capacity_and_hasher(
                 3 * triangles.len(),
                 BuildHasherDefault::default(),
@@ -242,6 +258,7 @@ impl Skin {
         let low = self.points.iter().copied().fold(Vec3::INFINITY, Vec3::min);
         let high = self.points.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
         let tolerance = flat * low.distance(high);
+        self.bend = BEND * low.distance(high);
         let normal = |t: u32| {
             let [a, b, c] = self.corners(t);
             (b - a).cross(c - a)
@@ -384,6 +401,52 @@ impl Skin {
                 }
             }
         }
+    }
+
+    /// Flips edges between patches nearly in one plane to those of the triangulation.
+    fn flip_bent(&mut self, missing: &[u32], stars: &mut Stars<'_>) {
+        let mut waiting: Vec<u32> = missing.iter().rev().copied().collect();
+        while let Some(t) = waiting.pop() {
+            for [a, b] in sides(self.triangles[t as usize]) {
+                let s = self.beyond([a, b]);
+                let (c, d) = (self.opposite(t, [a, b]), self.opposite(s, [a, b]));
+                let fresh = [[a, d, c], [d, b, c]];
+                let is_there = |v: [u32; 2]| self.across.contains_key(&key(v));
+                if !self.is_segment(t, [a, b]) || c == d || is_there([c, d]) || is_there([d, c]) {
+                    continue;
+                }
+                // More edges that are there, or more triangles with as many edges: this ends.
+                let is_gain = stars.has_edge([c, d])
+                    && (!stars.has_edge([a, b])
+                        || fresh.iter().all(|&new| stars.has_facet(new))
+                            && ![s, t]
+                                .iter()
+                                .all(|&old| stars.has_facet(self.triangles[old as usize])));
+                if !is_gain || !self.is_nearly_flat([a, b, c, d]) {
+                    continue;
+                }
+                self.across.remove(&key([a, b]));
+                self.across.remove(&key([b, a]));
+                for (t, corners) in [t, s].into_iter().zip(fresh) {
+                    self.set(t, corners);
+                    self.patch[t as usize] = self.plane.len() as u32;
+                    self.plane.push(projection_axis(self.corners(t)));
+                }
+                waiting.extend([t, s]);
+                break;
+            }
+        }
+    }
+
+    /// Whether the triangles `abc` and `bad`, and those of the other diagonal `cd`, look nearly the same way and are
+    /// close.
+    fn is_nearly_flat(&self, corners: [u32; 4]) -> bool {
+        let [a, b, c, d] = corners.map(|v| self.points[v as usize]);
+        let normals = [[a, b, c], [b, a, d], [a, d, c], [d, b, c]]
+            .map(|[p, q, r]| (q - p).cross(r - p).normalize_or_zero());
+        let [first, second] = [b - a, d - c];
+        let apart = first.cross(second).normalize_or_zero().dot(c - a).abs();
+        apart <= self.bend && (0..4).all(|i| (0..i).all(|j| normals[i].dot(normals[j]) >= STRAIGHT))
     }
 
     /// For each triangle the facet that it is of the cell inside, if it is one.
@@ -752,6 +815,15 @@ impl<'d> Stars<'d> {
 
     fn around(&mut self, vertex: u32) -> &[CellId] {
         self.known.entry(vertex).or_insert_with(|| star(self.delaunay, vertex))
+    }
+
+    fn has_facet(&mut self, [a, b, c]: [u32; 3]) -> bool {
+        let delaunay = self.delaunay;
+        let all = [a, b, c].map(VertexId);
+        self.around(a).iter().any(|&cell| {
+            let corners = delaunay.vertices(cell);
+            all.iter().all(|corner| corners.contains(corner))
+        })
     }
 
     fn has_edge(&mut self, [a, b]: [u32; 2]) -> bool {

@@ -10,7 +10,8 @@
 //!    polygon, which is triangulated ([`DualTriangulation`]).
 //!
 //! In a triangulation that contains the surface ([`Conforming`](super::Conforming)) *inside* is the place of
-//! the cell, and a centre outside is moved into its cell.
+//! the cell. One with its centre outside is left out where the complex without it has the same homotopy type.
+//! Otherwise the centre is moved into the cell.
 //!
 //! Coincident circumcentres are not merged: merging by position can close loops, and the published
 //! counts are those without merging.
@@ -26,7 +27,7 @@ use super::{Contacts, MedialMesh, Sphere};
 use crate::Vec3;
 use crate::geometry::trees::morton_order;
 use crate::geometry::triangulation::Triangulation;
-use crate::geometry::{CellId, Delaunay, VertexId};
+use crate::geometry::{CellId, Delaunay, DisjointSets, VertexId};
 use crate::surface::{InsideTest, Side, TriangleBvh};
 
 /// Circumcentres closer to the surface than this count as outside, in units of the diagonal.
@@ -84,11 +85,12 @@ impl CellSpheres {
         Self { in_guard_band, ..Self::of_inside(delaunay, circumspheres, is_inside, vec![]) }
     }
 
-    /// The spheres of cells of which it is known whether they are inside. A centre that is not inside is
-    /// moved into its cell, and its sphere shrunk to the surface.
+    /// The spheres of cells of which it is known whether they are inside. A cell whose centre is not
+    /// is left out if the topology allows it. Else its centre is moved into the cell, and its
+    /// sphere shrunk to the surface.
     pub fn of_cells(
         delaunay: &Delaunay,
-        is_inside: Vec<bool>,
+        mut is_inside: Vec<bool>,
         inside: &InsideTest,
         surface: &TriangleBvh,
     ) -> Self {
@@ -99,16 +101,18 @@ impl CellSpheres {
         let centre = |cell: u32| circumspheres[cell as usize].map_or(Vec3::INFINITY, |s| s.centre);
         let centres: Vec<Vec3> = known.iter().map(|&cell| centre(cell)).collect();
         let sides = inside.sides(&centres);
-        let moved: Vec<(CellId, Sphere)> = (known.par_iter().zip(&sides).zip(&centres))
-            .filter(|&((_, &side), &centre)| {
+        let outside =
+            (known.par_iter().zip(&sides).zip(&centres)).filter(|&((_, &side), &centre)| {
                 side != Side::Inside || surface.any_within(centre, GUARD_BAND)
-            })
-            .map(|((&cell, _), &centre)| {
-                let corners = delaunay.vertices(CellId(cell)).map(|v| delaunay.point(v));
-                let centre = nearest_within(corners, centre);
-                (CellId(cell), Sphere::new(centre, surface.closest(centre).distance))
-            })
-            .collect();
+            });
+        let mut outside: Vec<CellId> = outside.map(|((&cell, _), _)| CellId(cell)).collect();
+        leave_out(delaunay.triangulation(), &mut is_inside, &mut outside);
+        let moved = outside.into_par_iter().map(|cell| {
+            let corners = delaunay.vertices(cell).map(|v| delaunay.point(v));
+            let centre = nearest_within(corners, centre(cell.0));
+            (cell, Sphere::new(centre, surface.closest(centre).distance))
+        });
+        let moved = moved.collect();
         Self::of_inside(delaunay, circumspheres, is_inside, moved)
     }
 
@@ -144,11 +148,6 @@ impl CellSpheres {
         self.kept.iter().filter_map(|&cell| self.sphere(cell))
     }
 
-    /// Whether the circumcentre of a cell is inside; never for infinite cells.
-    pub fn is_centred_inside(&self, cell: CellId) -> bool {
-        self.is_inside(cell) && self.moved.binary_search_by_key(&cell, |&(cell, _)| cell).is_err()
-    }
-
     /// Whether a cell is part of the solid, or else whether its circumcentre is inside; never for infinite cells.
     pub fn is_inside(&self, cell: CellId) -> bool {
         // Finite cells come first; infinite ones are beyond the list.
@@ -164,6 +163,42 @@ impl CellSpheres {
         }
         ids
     }
+}
+
+/// Takes cells off the inside that leave the dual complex as it is, up to homotopy. Those that stay remain
+/// in the list.
+fn leave_out(triangulation: &Triangulation, is_inside: &mut [bool], cells: &mut Vec<CellId>) {
+    loop {
+        let before = cells.len();
+        cells.retain(|&cell| {
+            let is_tree = link_is_tree(triangulation, is_inside, cell);
+            is_inside[cell.index()] = !is_tree;
+            !is_tree
+        });
+        if cells.len() == before {
+            return;
+        }
+    }
+}
+
+/// Whether the neighbours inside of a cell, joined by the edges that are all inside, are a tree. Then the dual
+/// complex collapses to what is left of it without the cell.
+fn link_is_tree(triangulation: &Triangulation, is_inside: &[bool], cell: CellId) -> bool {
+    let inside = |cell: CellId| is_inside.get(cell.index()) == Some(&true);
+    let neighbours = triangulation.neighbours(cell).map(inside);
+    let mut parts = neighbours.iter().filter(|&&is_inside| is_inside).count();
+    let mut sets = DisjointSets::singletons(4);
+    for (i, j) in EDGES_OF_CELL {
+        if triangulation.edge_ring(cell, i, j).all(inside) {
+            // The edge joins the facets opposite to the other two corners, whose numbers add up to this.
+            let k = (0..4).find(|&k| k != i && k != j).unwrap_or(0);
+            if !sets.join(k as u32, (6 - i - j - k) as u32) {
+                return false;
+            }
+            parts -= 1;
+        }
+    }
+    parts == 1
 }
 
 /// How much of its cell a centre may reach that is moved into it, from the centroid.

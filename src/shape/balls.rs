@@ -32,7 +32,7 @@ impl InnerBalls {
         cells: &CellSpheres,
         samples: &Arc<[Vec3]>,
     ) -> Self {
-        let balls = Poles::new(delaunay).inner_balls(|cell| cells.is_centred_inside(cell));
+        let balls = Poles::new(delaunay).inner_balls(|cell| cells.is_inside(cell));
         let contacts = Contacts {
             samples: Arc::clone(samples),
             of_sphere: balls.iter().map(|b| b.samples).collect(),

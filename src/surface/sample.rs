@@ -21,12 +21,12 @@ use crate::sum::Sum;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum Sampling {
-    /// The vertices of the mesh, unaltered.
-    #[default]
+    /// The vertices of the mesh, unaltered: as in the papers.
     MeshVertices,
     /// The vertices of the mesh, and points that are added until their Delaunay triangulation contains the
     /// surface: by [`Shape`](crate::shape::Shape), which triangulates them. To [`sample`] alone these are
     /// the vertices.
+    #[default]
     Conforming,
     /// Independent points, uniformly distributed by area.
     AreaUniform {

@@ -32,7 +32,8 @@ fn right_start(name: &str, mesh: &TriMesh) -> (usize, MedialMesh) {
     let samples = shape.samples();
     assert_eq!(samples[..mesh.vertices.len()], shape.mesh().vertices, "{name}");
     let tree = shape.surface_tree().unwrap();
-    assert!(tree.distance_batch(&samples).iter().all(|&d| d < 2e-6), "{name}: a sample off");
+    // Points are added on a surface whose edges may have been flipped.
+    assert!(tree.distance_batch(&samples).iter().all(|&d| d < 3e-3), "{name}: a sample off");
     (samples.len() - mesh.vertices.len(), (*start).clone())
 }
 
@@ -72,7 +73,7 @@ fn real_meshes_have_the_topology_of_their_solids() {
         shares.push(added as f64 / mesh.vertices.len() as f64);
     }
     shares.sort_by(f64::total_cmp);
-    assert!(shares.iter().all(|&share| share <= 0.5), "{shares:?}");
+    assert!(shares.iter().all(|&share| share <= 0.1), "{shares:?}");
 }
 
 /// A wedge between two half-planes that meet at a small angle, cut off at a distance of 1.
@@ -97,6 +98,11 @@ fn scaled(mesh: TriMesh, factors: Vec3) -> TriMesh {
     shapes::moved(mesh, |p| p * factors)
 }
 
+fn turned(mesh: TriMesh) -> TriMesh {
+    let axis = Vec3::new(1.0, 2.0, 3.0).normalize();
+    shapes::moved(mesh, |p| glam::DQuat::from_axis_angle(axis, 1.0) * p)
+}
+
 #[test]
 fn coarse_thin_and_sharp_solids_have_their_topology() {
     let box_of = |half: [f64; 3]| shapes::cuboid(-Vec3::from(half), Vec3::from(half));
@@ -115,6 +121,7 @@ fn coarse_thin_and_sharp_solids_have_their_topology() {
         ("wedge of 5 degrees", wedge(5.0)),
         ("wedge of 1 degree", wedge(1.0)),
         ("nested spheres", hollow(&ball(4), &scaled(ball(3), Vec3::splat(0.9)))),
+        ("a thin shell", hollow(&ball(4), &turned(scaled(ball(4), Vec3::splat(0.99))))),
         (
             "a coarse sphere in a box",
             hollow(&box_of([1.0; 3]), &scaled(ball(1), Vec3::splat(0.99))),

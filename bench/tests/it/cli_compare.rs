@@ -191,8 +191,9 @@ fn empty_results_and_meshes_are_errors() {
 
     // Two cubes that are far smaller than a billionth of the distance between them.
     fs::write(&far, cubes_off(&[(0.0, 1.0), (1e12, 1.0)])).expect("written");
-    refused(&["axis", &far], 1, "far.off");
-    refused(&["axis", &far], 1, "billionth");
+    let words = ["axis", &far, "--sampling", "vertices"];
+    refused(&words, 1, "far.off");
+    refused(&words, 1, "billionth");
 }
 
 /// A medial mesh of the built-in capsule with 20 spheres.

@@ -140,7 +140,7 @@ fn published_counts_and_errors_on_real_meshes() {
     let Some(meshes) = medial_test_support::meshes() else { return };
     for (file, spheres) in [("bear.off", 34_703_i64), ("dolphin.off", 54_241)] {
         let mesh = meshes.join(file);
-        let (_, object) = json(&["axis", text_path(&mesh)]);
+        let (_, object) = json(&["axis", text_path(&mesh), "--sampling", "vertices"]);
         let counted = object["spheres"].as_i64().expect("a count");
         assert!((counted - spheres).abs() <= 5, "{file}: {counted}, published {spheres}");
         assert_eq!(object["betti"], serde_json::json!([1, 0, 0]), "{file}");
