@@ -104,9 +104,14 @@ struct Triangulated {
 
 impl Triangulated {
     /// The triangulation that [`Sampling::Conforming`] requests, or that of the vertices.
-    fn conforming(mesh: &TriMesh, report: &SurfaceReport) -> Result<Self, TriangulationError> {
+    fn conforming(
+        mesh: &TriMesh,
+        report: &SurfaceReport,
+        least: usize,
+    ) -> Result<Self, TriangulationError> {
+        let begin = mesh.vertices.len().max(least);
         let found = match report.intersecting_pairs {
-            0 => Conforming::new(mesh, (8 * mesh.vertices.len()).max(LEAST_BUDGET)),
+            0 => Conforming::new(mesh, begin, (8 * begin).max(LEAST_BUDGET)),
             // No refinement would end.
             _ => Err(ConformingError::Crossing),
         };
@@ -465,7 +470,7 @@ impl Shape {
     pub fn samples(&self) -> Arc<[Vec3]> {
         let Store { of_samples, options, mesh, .. } = &*self.store;
         let triangulated = match options.sampling {
-            Sampling::Conforming => self.triangulated().ok(),
+            Sampling::Conforming { .. } => self.triangulated().ok(),
             _ => None,
         };
         let built = of_samples.samples.get(options.sampling, of_samples.is_of_asker, || {
@@ -499,15 +504,15 @@ impl Shape {
 
     fn triangulated(&self) -> Result<Arc<Triangulated>, ShapeError> {
         let Store { options, mesh, report, .. } = &*self.store;
-        let samples = match options.sampling {
-            Sampling::Conforming => None,
-            _ => Some(self.samples()),
+        let (least, samples) = match options.sampling {
+            Sampling::Conforming { least } => (least, None),
+            _ => (0, Some(self.samples())),
         };
         let built = self.built(
             |of_samples| &of_samples.delaunay,
             || {
                 let triangulated = match &samples {
-                    None => Triangulated::conforming(mesh, report),
+                    None => Triangulated::conforming(mesh, report, least),
                     Some(samples) => Triangulated::plain(samples),
                 };
                 Ok(Arc::new(triangulated?))

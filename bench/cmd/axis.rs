@@ -64,7 +64,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     warnings.extend(shape.sampling_warning());
     if let Some(expected) = expected.filter(|&expected| expected != betti) {
         let advice = match shape.options().sampling {
-            Sampling::Conforming => "",
+            Sampling::Conforming { .. } => "",
             _ => "; try --sampling conforming",
         };
         warnings.push(format!(

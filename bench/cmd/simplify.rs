@@ -142,7 +142,7 @@ fn topology_warnings(result: &MedialMesh, shape: &Shape) -> Vec<String> {
     let start = initial.and_then(|initial| topology_warning(complex::betti(&initial), expected));
     let advice = match shape.options().sampling {
         _ if shape.has_given_initial() => "",
-        Sampling::Conforming => "",
+        Sampling::Conforming { .. } => "",
         _ => "; try `--sampling conforming`",
     };
     let start =

@@ -469,7 +469,7 @@ enum Pair {
 impl Guard {
     pub fn new(mesh: &MedialMesh, still: Still) -> Self {
         let Still { faces, corners } = still;
-        let tree = Crossings::new(faces, |f| corners[f as usize]);
+        let tree = Crossings::new(faces.len(), |f| corners[f as usize]);
         let mut this = Self { still: tree, known: BTreeSet::new() };
         this.known = this.crossing(mesh, |_| true).into_iter().collect();
         this
@@ -523,13 +523,13 @@ impl Guard {
         is_chosen: impl Fn(&[u32; 3]) -> bool + Sync,
     ) -> Vec<Pair> {
         let moving =
-            Crossings::new(mesh.faces.clone(), |face| corners(mesh, mesh.faces[face as usize]));
+            Crossings::new(mesh.faces.len(), |face| corners(mesh, mesh.faces[face as usize]));
         let moving = moving.pairs_with(|face| is_chosen(&mesh.faces[face as usize]));
         let moving = moving.into_iter().map(Pair::Moving);
         let chosen = (0..mesh.faces.len() as u32).filter(|&f| is_chosen(&mesh.faces[f as usize]));
         let still = chosen.flat_map(|face| {
             let own = mesh.faces[face as usize];
-            let others = self.still.of(own, corners(mesh, own));
+            let others = self.still.of(corners(mesh, own));
             others.into_iter().map(move |other| Pair::Still([face, other]))
         });
         moving.chain(still).collect()

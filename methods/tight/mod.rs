@@ -5,9 +5,8 @@
 //! errors of samples on both sides: surface points that the union misses, balls that protrude, and points
 //! inside that no primitive holds.
 //!
-//! 1. *Start.* The medial mesh of blue-noise samples, twice as many until its Betti numbers are the
-//!    solid's, simplified by another method (Q-MAT) to `start` spheres or three times the target,
-//!    whichever is more (`start.rs`).
+//! 1. *Start.* The initial medial mesh, of `samples` samples at least, simplified by another method (Q-MAT) to
+//!    `start` spheres or three times the target, whichever is more (`start.rs`).
 //! 2. *Residuals* (`goal.rs`): at samples of the surface `sigma`; at points of the primitives how far their
 //!    ball protrudes; at interior points how far they are from being held.
 //! 3. *Descent* (`rounds.rs`): Levenberg-Marquardt on all spheres at once for a power of the residuals,
@@ -120,7 +119,7 @@ impl MedialSimplifier for Tight {
 
     fn prepare<'s>(&self, shape: &'s Shape, params: &Params, run: &RunContext) -> Prepared<'s> {
         let params = params.typed::<TightParams>()?.validate()?;
-        let start = Start::new(shape, Arc::clone(&self.starter), &params, run)?;
+        let start = Start::new(shape, Arc::clone(&self.starter), &params)?;
         let goal = Goal::new(shape, run.seed)?;
         Ok(Box::new(PreparedTight { start, goal, params, run: run.clone() }))
     }
@@ -246,15 +245,15 @@ medial::parameters! {
         /// Weight of the mean of the squares next to the high powers: larger for a smaller mean error.
         lambda: f64 = 0.15, "pure number";
         /// Spheres that the start is simplified to, unless three times the target are more.
-        start: usize = 2_500, "spheres";
-        /// Blue-noise samples of the start's medial mesh, doubled while its Betti numbers are wrong.
-        samples: usize = 20_000, "samples";
+        start: usize = 1_200, "spheres";
+        /// Samples of the initial medial mesh at least; a coarse surface gets more.
+        samples: usize = 5_000, "samples";
         /// Rounds of steps at high powers before each further one begins with a swap.
         rounds: usize = 8, "rounds";
     }
 }
 
-/// Most samples to begin with; they can be doubled twice.
+/// Most samples that are added.
 const MOST_SAMPLES: usize = 200_000;
 
 /// Most rounds.

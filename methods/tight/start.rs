@@ -1,17 +1,18 @@
 //! The medial mesh that everything starts from.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use medial::Vec3;
 use medial::complex::collapse::CollapseComplex;
-use medial::complex::{Crossings, MedialMesh, Primitive, Sphere, betti, crossing_faces};
-use medial::geometry::trees::{Bounds, PointTree};
-use medial::geometry::{DisjointSets, triangles_meet};
+use medial::complex::{
+    Crossings, MedialMesh, Primitive, Sphere, betti, crossing_faces, faces_cross,
+};
+use medial::geometry::trees::Bounds;
 use medial::metrics::topology_warning;
 use medial::shape::Shape;
 use medial::simplifier::{Diagnostics, Level, MedialSimplifier, Params, RunContext};
-use medial::surface::{Sampling, Side};
+use medial::surface::Sampling;
 
 use super::collapse::{Passed, Patch};
 use super::goal::{Goal, Row, vertices};
@@ -19,26 +20,19 @@ use super::rounds::{Descent, LEAST_RADIUS};
 use super::{MANY, TightParams, collapse};
 use crate::Result;
 
-/// Times that the samples are doubled at most.
-const DOUBLINGS: usize = 2;
+/// Samples of a surface that crosses itself, which has no conforming triangulation.
+const OF_CROSSING: usize = 20_000;
 
-/// Components that are joined at most, and points between two spheres that must be inside for that.
-const JOINED: usize = 64;
-const BETWEEN: usize = 16;
-
-/// A start: the given medial mesh of a shape, or one of denser samples with a method that simplifies it.
+/// A start: the initial medial mesh of a shape, with a method that simplifies it.
 pub(super) struct Start {
     shape: Shape,
     starter: Arc<dyn MedialSimplifier>,
     least: usize,
-    is_given: bool,
-    samples: usize,
-    joined: usize,
     betti: [u64; 3],
 }
 
 impl Start {
-    /// Samples the surface until the Betti numbers of the medial mesh are right.
+    /// Adds samples to a coarse surface.
     ///
     /// # Errors
     /// When the samples do not span space, or the given mesh has no sphere.
@@ -46,60 +40,30 @@ impl Start {
         shape: &Shape,
         starter: Arc<dyn MedialSimplifier>,
         params: &TightParams,
-        run: &RunContext,
     ) -> Result<Self> {
         // Built here, so that they count as substrates of the shape.
         shape.surface_tree()?;
         shape.inside_test();
-        let least = params.start;
-        if shape.has_given_initial() {
-            let initial = shape.initial()?;
-            let betti = betti(&initial);
-            let shape = shape.starting_from(initial)?;
-            return Ok(Self {
-                shape,
-                starter,
-                least,
-                is_given: true,
-                samples: 0,
-                joined: 0,
-                betti,
-            });
-        }
-        let expected = shape.expected_betti();
-        let mut best: Option<(u64, Self)> = None;
-        for doubling in 0..=DOUBLINGS {
-            run.step(doubling, DOUBLINGS + 1)?;
-            let samples = params.samples << doubling;
-            let fine = shape.resampled(Sampling::BlueNoise { count: samples, seed: run.seed });
-            let mut mesh = MedialMesh::clone(fine.initial()?.as_ref());
-            let joined = joined(&mut mesh, shape, expected.map_or(u64::MAX, |[parts, ..]| parts));
-            let betti = betti(&mesh);
-            let fine = if joined > 0 { fine.starting_from(Arc::new(mesh))? } else { fine };
-            let wrong = expected.map_or(0, |expected| {
-                expected.iter().zip(betti).map(|(&expected, found)| expected.abs_diff(found)).sum()
-            });
-            // More samples can make it worse: the least wrong is kept, of equal ones the first.
-            if best.as_ref().is_none_or(|(least, _)| wrong < *least) {
-                let starter = Arc::clone(&starter);
-                let start =
-                    Self { shape: fine, starter, least, is_given: false, samples, joined, betti };
-                best = Some((wrong, start));
+        let finer = match shape.options().sampling {
+            _ if shape.has_given_initial() => None,
+            Sampling::Conforming { least } => {
+                let samples = shape.mesh().vertices.len().max(least);
+                (samples < params.samples).then_some(Sampling::Conforming { least: params.samples })
             }
-            if wrong == 0 {
-                break;
-            }
+            _ => None,
+        };
+        let mut shape = finer.map_or_else(|| shape.clone(), |finer| shape.resampled(finer));
+        let mut initial = shape.initial()?;
+        if shape.sampling_warning().is_some() {
+            shape = shape.resampled(Sampling::BlueNoise { count: OF_CROSSING, seed: 0 });
+            initial = shape.initial()?;
         }
-        let (_, start) = best.expect("there is a first one");
-        Ok(start)
+        Ok(Self { betti: betti(&initial), shape, starter, least: params.start })
     }
 
     /// Adds its warnings and counts.
     pub fn describe(&self, diagnostics: &mut Diagnostics) {
-        diagnostics.count("samples_of_the_start", self.samples);
-        if self.joined > 0 {
-            diagnostics.count("components_joined", self.joined);
-        }
+        diagnostics.count("samples_of_the_start", self.shape.samples().len());
         if let Some(warning) = topology_warning(self.betti, self.shape.expected_betti()) {
             diagnostics.warn(format!("the start is wrong, and so is the result: {warning}"));
         }
@@ -117,7 +81,9 @@ impl Start {
     ) -> Result<MedialMesh> {
         let initial = self.shape.initial()?;
         let wanted = self.least.max(MANY.saturating_mul(count));
-        let mesh = if initial.spheres.len() <= if self.is_given { count } else { wanted } {
+        let mesh = if initial.spheres.len()
+            <= if self.shape.has_given_initial() { count } else { wanted }
+        {
             MedialMesh::clone(&initial)
         } else {
             let mut levels = self.starter.prepare(&self.shape, &Params::none(), run)?;
@@ -134,60 +100,6 @@ impl Start {
         };
         Ok(MedialMesh { contacts: None, ..mesh })
     }
-}
-
-/// Joins components by edges inside the solid until `parts` are left, the smallest one to the part closest to it.
-/// Where the solid is thinner than the samples are apart, its medial mesh can fall into pieces. Returns how many
-/// edges were added.
-pub(super) fn joined(mesh: &mut MedialMesh, shape: &Shape, parts: u64) -> usize {
-    let mut sets = DisjointSets::singletons(mesh.spheres.len());
-    mesh.edges.iter().for_each(|&[a, b]| {
-        sets.join(a, b);
-    });
-    let extra = sets.len().saturating_sub(usize::try_from(parts).unwrap_or(usize::MAX));
-    if extra == 0 || extra > JOINED {
-        return 0;
-    }
-    let mut stuck = BTreeSet::new();
-    let mut joined = 0;
-    while joined < extra {
-        let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        (0..mesh.spheres.len() as u32)
-            .for_each(|v| members.entry(sets.find(v)).or_default().push(v));
-        // One whose shortest bridge leaves the solid is passed over, or the loop would not end.
-        let left = members.iter().filter(|(set, _)| !stuck.contains(*set));
-        let Some((&set, own)) = left.min_by_key(|(_, own)| own.len()) else { break };
-        match bridge(mesh, shape, own) {
-            Some([a, b]) => {
-                mesh.edges.push([a.min(b), a.max(b)]);
-                sets.join(a, b);
-                joined += 1;
-            }
-            None => {
-                stuck.insert(set);
-            }
-        }
-    }
-    // Edges of a medial mesh ascend.
-    mesh.edges.sort_unstable();
-    joined
-}
-
-/// The shortest edge from some spheres to any other one, if it is inside the solid.
-fn bridge(mesh: &MedialMesh, shape: &Shape, own: &[u32]) -> Option<[u32; 2]> {
-    let centres: Vec<Vec3> = mesh.spheres.iter().map(|sphere| sphere.centre).collect();
-    let is_own: BTreeSet<u32> = own.iter().copied().collect();
-    let others: Vec<u32> = (0..mesh.spheres.len() as u32).filter(|v| !is_own.contains(v)).collect();
-    let tree = PointTree::new(&others.iter().map(|&v| centres[v as usize]).collect::<Vec<_>>());
-    let nearest = own.iter().filter_map(|&v| {
-        let (place, squared) = tree.nearest(centres[v as usize])?;
-        Some((squared, [v, others[place as usize]]))
-    });
-    let (_, [a, b]) = nearest.min_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)))?;
-    let [from, to] = [a, b].map(|v| centres[v as usize]);
-    let between = (1..BETWEEN).map(|k| from.lerp(to, k as f64 / BETWEEN as f64));
-    let sides = shape.inside_test().sides(&between.collect::<Vec<_>>());
-    sides.iter().all(|&side| side == Side::Inside).then_some([a, b])
 }
 
 // ----------------------------------------------------------------------------
@@ -213,7 +125,7 @@ pub(super) struct Sheets<'a> {
 
 impl<'a> Sheets<'a> {
     pub fn new(mesh: &'a MedialMesh) -> Self {
-        let first = Crossings::new(mesh.faces.clone(), |f| corners(mesh, mesh.faces[f as usize]));
+        let first = Crossings::new(mesh.faces.len(), |f| corners(mesh, mesh.faces[f as usize]));
         let pairs = first.pairs().into_iter();
         let known = pairs.map(|pair| pair.map(|f| mesh.faces[f as usize])).collect();
         Self { mesh, first, known, moved: vec![], is_moved: vec![false; mesh.spheres.len()] }
@@ -227,9 +139,9 @@ impl<'a> Sheets<'a> {
         star.iter().enumerate().any(|(i, &face)| {
             let own = face.map(place);
             let crosses = |other: Face, corners: [Vec3; 3]| {
-                triangles_meet(face, own, other, corners) && !self.is_known([a, b], face, other)
+                faces_cross(own, corners) && !self.is_known([a, b], face, other)
             };
-            let still = self.first.of(face, own).into_iter().map(|f| self.mesh.faces[f as usize]);
+            let still = self.first.of(own).into_iter().map(|f| self.mesh.faces[f as usize]);
             let still = still.filter(|other| !other.iter().any(|&v| self.is_moved[v as usize]));
             if still.filter(|other| !is_star(other)).any(|f| !self.is_known([a, b], face, f)) {
                 return true;
@@ -384,7 +296,7 @@ struct Edit {
 impl Edit {
     fn new(mesh: &MedialMesh) -> Self {
         Self {
-            sheets: Crossings::new(mesh.faces.clone(), |f| corners(mesh, mesh.faces[f as usize])),
+            sheets: Crossings::new(mesh.faces.len(), |f| corners(mesh, mesh.faces[f as usize])),
             spheres: mesh.spheres.clone(),
             edges: mesh.edges.iter().copied().collect(),
             faces: mesh.faces.iter().copied().collect(),
@@ -448,8 +360,7 @@ impl Edit {
     /// Whether a face of an edge and a new centre would cross another one.
     fn crosses(&self, [a, b]: [u32; 2], centre: Vec3) -> bool {
         let [p, q] = [a, b].map(|v| self.spheres[v as usize].centre);
-        let new = self.spheres.len() as u32;
-        !self.sheets.of([a, b, new], [p, q, centre]).is_empty()
+        !self.sheets.of([p, q, centre]).is_empty()
     }
 
     fn push(&mut self, sphere: Sphere) -> u32 {

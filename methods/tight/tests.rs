@@ -9,7 +9,7 @@ use rand_pcg::Pcg64;
 use super::collapse::{Guard, Patch, Still};
 use super::goal::{Goal, Row, vertices};
 use super::rounds::{Descent, Normal, Objective, Pattern};
-use super::start::{Sheets, joined, swapped};
+use super::start::{Sheets, swapped};
 
 fn shape(id: &str, resolution: u32) -> Shape {
     let mesh = medial_datasets::find(id).expect("in the catalogue").mesh(resolution);
@@ -354,16 +354,12 @@ fn the_result_has_no_more_crossing_faces_than_the_start_and_says_how_many_that_h
 }
 
 #[test]
-fn pieces_of_one_solid_are_joined_inside_it() {
-    let shape = shape("box", 4);
-    let (lo, hi) = shape.mesh().bounding_box().unwrap();
-    let at = |t: f64| Sphere::new(lo.lerp(hi, t), 0.02);
-    let spheres = vec![at(0.4), at(0.45), at(0.5), at(0.6)];
-    let mut mesh = MedialMesh::from_simplices(spheres, vec![[0, 1]], vec![]).unwrap();
-    assert_eq!(joined(&mut mesh, &shape, 1), 2);
-    assert_eq!(mesh.edges, vec![[0, 1], [1, 2], [2, 3]]);
-    assert_eq!(joined(&mut mesh, &shape, 1), 0);
-    // A sphere outside is not joined to it.
-    mesh.spheres.push(Sphere::new(hi + Vec3::splat(0.5), 0.1));
-    assert_eq!(joined(&mut mesh, &shape, 1), 0);
+fn axes_in_one_plane_or_on_one_line_do_not_block_collapses() {
+    for id in ["box", "capsule"] {
+        let shape = shape(id, 12);
+        let tight = crate::find("tight").unwrap();
+        let mut levels = tight.prepare(&shape, &quick(), &RunContext::default()).unwrap();
+        let found = levels.at(Level::Spheres(12)).unwrap();
+        assert_eq!((found.mesh.spheres.len(), betti(&found.mesh)), (12, [1, 0, 0]), "{id}");
+    }
 }

@@ -118,8 +118,8 @@ pub enum ConformingError {
 }
 
 impl Conforming {
-    /// Refines a closed, oriented surface until the Delaunay triangulation of its samples contains it. No
-    /// round begins after `most` points were added. The same result for any number of threads. Cost:
+    /// Refines a closed, oriented surface until it has `least` points, by its longest edges, and the Delaunay
+    /// triangulation contains it. No round begins after `most` points were added for that. The same result for any number of threads. Cost:
     /// `O(n log n)` expected, and `O(n)` for each round.
     ///
     /// # Errors
@@ -128,11 +128,11 @@ impl Conforming {
     ///
     /// # Panics
     /// If a face names a vertex that does not exist.
-    pub fn new(surface: &TriMesh, most: usize) -> Result<Self, ConformingError> {
+    pub fn new(surface: &TriMesh, least: usize, most: usize) -> Result<Self, ConformingError> {
         let delaunay = Delaunay::new(&surface.vertices)?;
-        match Self::refined(surface, delaunay.clone(), most, FLAT[0]) {
+        match Self::refined(surface, delaunay.clone(), [least, most], false) {
             // Flips can make close sheets cross.
-            Err(ConformingError::Crossing) => Self::refined(surface, delaunay, most, FLAT[1]),
+            Err(ConformingError::Crossing) => Self::refined(surface, delaunay, [least, most], true),
             found => found,
         }
     }
@@ -140,17 +140,20 @@ impl Conforming {
     fn refined(
         surface: &TriMesh,
         mut delaunay: Delaunay,
-        most: usize,
-        flat: f64,
+        [least, most]: [usize; 2],
+        is_strict: bool,
     ) -> Result<Self, ConformingError> {
-        let mut skin = Skin::new(surface, &delaunay, flat)?;
+        let mut skin = Skin::new(surface, &delaunay, FLAT[usize::from(is_strict)])?;
         skin.flip_by_angles(0..skin.triangles.len());
+        skin.split_longest(least);
+        let begin = skin.points.len();
+        delaunay.insert(&skin.points[surface.vertices.len()..])?;
         let mut rounds = 0;
         let mut missing = skin.missing(&delaunay);
         loop {
             let mut stars = Stars::of(&delaunay);
             skin.flip_to(&missing, &mut stars);
-            if flat == FLAT[0] {
+            if !is_strict {
                 skin.flip_bent(&missing, &mut stars);
             }
             let suspects = skin.with_changed(missing);
@@ -158,7 +161,7 @@ impl Conforming {
             if missing.is_empty() {
                 break;
             }
-            let added = skin.points.len() - surface.vertices.len();
+            let added = skin.points.len() - begin;
             if added >= most || rounds >= ROUNDS {
                 return Err(ConformingError::Budget { missing: missing.len(), added, most });
             }
@@ -620,6 +623,31 @@ impl Skin {
             changed.extend([t, self.push_triangle([m, b, c], patch)]);
         }
         self.flip_by_angles(changed.into_iter().map(|t| t as usize));
+    }
+
+    /// Halves the longest edges until there are so many points.
+    fn split_longest(&mut self, least: usize) {
+        while self.points.len() < least {
+            let length = |[a, b]: [u32; 2]| {
+                self.points[a as usize].distance_squared(self.points[b as usize])
+            };
+            let all = self.triangles.iter().flat_map(|&t| sides(t)).filter(|[a, b]| a < b);
+            let mut all: Vec<(f64, [u32; 2])> = all.map(|edge| (length(edge), edge)).collect();
+            all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            let longest = all.first().map_or(0.0, |edge| edge.0);
+            // No edge is short enough to fall onto its ends.
+            all.retain(|edge| edge.0 >= 0.5 * longest && edge.0 > 0.0);
+            if all.is_empty() {
+                return;
+            }
+            for (_, [a, b]) in all {
+                // Splits of this round can have flipped it.
+                if self.points.len() < least && self.across.contains_key(&key([a, b])) {
+                    let middle = self.points[a as usize].midpoint(self.points[b as usize]);
+                    self.split_edge([a, b], middle);
+                }
+            }
+        }
     }
 
     fn split_triangle(&mut self, t: u32, at: Vec3) {

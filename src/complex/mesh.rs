@@ -7,7 +7,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::Vec3;
-use crate::geometry::{Sphere, TriangleTree, triangles_meet};
+use crate::geometry::{Sphere, TriangleTree, triangles_cross};
 
 /// The boundary samples that each sphere touches, from the triangulation that it was made of.
 #[derive(Clone, Debug, PartialEq)]
@@ -487,19 +487,28 @@ impl<T: Copy + Default> Runs<T> {
     }
 }
 
-// Faces of a medial mesh that cross: pairs that meet outside of the vertices and edges they share.
+// Faces of a medial mesh that cross: pairs of which an edge of one passes through the other.
 //
 // The medial axis of a solid has none; that of samples has a few where sheets are thinner than the samples
-// are apart; collapses and moves of spheres make more. Exact, and of the centres alone: radii play no part.
+// are apart; collapses and moves of spheres make more. Of the centres alone: radii play no part.
+// The axis of a plate or a tube has many faces in one plane or on one line, up to rounding. These do not count.
 
-/// The pairs of faces that cross, ascending. Faces without area are not looked at.
+/// How far both ends of an edge are at least from a face that it crosses, in normalised units.
+const CROSSING: f64 = 1e-6;
+
+/// Whether two faces of a medial mesh in normalised units cross.
+pub fn faces_cross(s: [Vec3; 3], t: [Vec3; 3]) -> bool {
+    triangles_cross(s, t, CROSSING)
+}
+
+/// The pairs of faces that cross, ascending. Faces of nearly no area are not looked at.
 ///
 /// Cost `O(F log F)` and the pairs whose boxes overlap.
 ///
 /// # Panics
 /// If a face is out of range; see [`MedialMesh::check`].
 pub fn crossing_faces(mesh: &MedialMesh) -> Vec<[u32; 2]> {
-    Crossings::new(mesh.faces.clone(), |face| {
+    Crossings::new(mesh.faces.len(), |face| {
         mesh.faces[face as usize].map(|v| mesh.spheres[v as usize].centre)
     })
     .pairs()
@@ -508,20 +517,18 @@ pub fn crossing_faces(mesh: &MedialMesh) -> Vec<[u32; 2]> {
 /// Faces in a tree, for the pairs that cross.
 #[derive(Clone, Debug)]
 pub struct Crossings {
-    faces: Vec<[u32; 3]>,
     tree: TriangleTree,
 }
 
 impl Crossings {
-    /// The faces of these vertices, with the corners `corners(face)`.
-    pub fn new(faces: Vec<[u32; 3]>, corners: impl Fn(u32) -> [Vec3; 3]) -> Self {
-        let tree = TriangleTree::new(0..faces.len() as u32, corners);
-        Self { faces, tree }
+    /// So many faces, with the corners `corners(face)`.
+    pub fn new(faces: usize, corners: impl Fn(u32) -> [Vec3; 3]) -> Self {
+        Self { tree: TriangleTree::new(0..faces as u32, corners) }
     }
 
-    /// The faces that cross one with these vertices and corners, ascending. It need not be one of them.
-    pub fn of(&self, face: [u32; 3], corners: [Vec3; 3]) -> Vec<u32> {
-        self.among(face, corners, |_| true)
+    /// The faces that cross one with these corners, ascending. It need not be one of them.
+    pub fn of(&self, corners: [Vec3; 3]) -> Vec<u32> {
+        self.among(corners, |_| true)
     }
 
     /// All pairs that cross, ascending.
@@ -537,9 +544,8 @@ impl Crossings {
             .filter(|&(face, _)| is_asked(face))
             .flat_map_iter(|(face, corners)| {
                 // Each pair once, and no face with itself: of two requested faces the smaller finds it.
-                let others = self.among(self.faces[face as usize], corners, |other| {
-                    other > face || (other < face && !is_asked(other))
-                });
+                let others =
+                    self.among(corners, |other| other > face || (other < face && !is_asked(other)));
                 others.into_iter().map(move |other| ascending_edge([face, other]))
             })
             .collect();
@@ -547,15 +553,10 @@ impl Crossings {
         pairs
     }
 
-    fn among(
-        &self,
-        face: [u32; 3],
-        corners: [Vec3; 3],
-        is_asked: impl Fn(u32) -> bool,
-    ) -> Vec<u32> {
+    fn among(&self, corners: [Vec3; 3], is_asked: impl Fn(u32) -> bool) -> Vec<u32> {
         let mut found = vec![];
         self.tree.overlapping(corners, |other, place| {
-            if is_asked(other) && triangles_meet(face, corners, self.faces[other as usize], place) {
+            if is_asked(other) && faces_cross(corners, place) {
                 found.push(other);
             }
             ControlFlow::Continue(())

@@ -18,7 +18,7 @@ pub use formats::{
 };
 pub use mesh::Incidence;
 pub use mesh::{ComplexError, Contacts, MedialMesh};
-pub use mesh::{Crossings, crossing_faces};
+pub use mesh::{Crossings, crossing_faces, faces_cross};
 pub use topology::cubical_betti;
 pub use topology::{betti, euler};
 pub use union::{MedialUnion, NearestPrimitive, Primitive, Readings, UnionError};

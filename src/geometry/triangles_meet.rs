@@ -95,6 +95,33 @@ pub fn triangles_meet(f: [u32; 3], s: [Vec3; 3], g: [u32; 3], t: [Vec3; 3]) -> b
     }
 }
 
+/// Whether an edge of one of two triangles passes through the inside of the other, with both ends farther than `depth`
+/// from its plane. Triangles that share corners or lie in one plane do not, nor do those of a smaller height.
+/// In floating point.
+pub fn triangles_cross(s: [Vec3; 3], t: [Vec3; 3], depth: f64) -> bool {
+    passes_through(s, t, depth) || passes_through(t, s, depth)
+}
+
+fn passes_through(edges: [Vec3; 3], [a, b, c]: [Vec3; 3], depth: f64) -> bool {
+    let normal = (b - a).cross(c - a);
+    let area = normal.length();
+    let longest =
+        (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
+    if area <= depth * longest.sqrt() {
+        return false;
+    }
+    let heights = edges.map(|p| (p - a).dot(normal) / area);
+    (0..3).any(|i| {
+        let (p, q) = (edges[i], edges[(i + 1) % 3]);
+        let (above, below) = (heights[i], heights[(i + 1) % 3]);
+        if above * below >= 0.0 || above.abs() <= depth || below.abs() <= depth {
+            return false;
+        }
+        let x = p.lerp(q, above / (above - below));
+        [(a, b), (b, c), (c, a)].iter().all(|&(u, v)| (v - u).cross(x - u).dot(normal) > 0.0)
+    })
+}
+
 fn opposite(t: [Vec3; 3], corner: usize) -> [Vec3; 2] {
     [t[(corner + 1) % 3], t[(corner + 2) % 3]]
 }

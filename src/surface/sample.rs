@@ -16,9 +16,9 @@ use crate::sum::Sum;
 
 /// How a surface is sampled.
 ///
-/// As text: `conforming`, `vertices`, `uniform:20000`, `blue:20000`, the latter two with an optional seed
-/// as in `blue:20000:7`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+/// As text: `conforming`, `conforming:20000`, `vertices`, `uniform:20000`, `blue:20000`, the latter two with an
+/// optional seed as in `blue:20000:7`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum Sampling {
     /// The vertices of the mesh, unaltered: as in the papers.
@@ -26,8 +26,10 @@ pub enum Sampling {
     /// The vertices of the mesh, and points that are added until their Delaunay triangulation contains the
     /// surface: by [`Shape`](crate::shape::Shape), which triangulates them. To [`sample`] alone these are
     /// the vertices.
-    #[default]
-    Conforming,
+    Conforming {
+        /// Number of points at least: the longest edges are split before.
+        least: usize,
+    },
     /// Independent points, uniformly distributed by area.
     AreaUniform {
         /// Number of points.
@@ -45,11 +47,17 @@ pub enum Sampling {
     },
 }
 
+impl Default for Sampling {
+    fn default() -> Self {
+        Self::Conforming { least: 0 }
+    }
+}
+
 /// A text that names no sampling.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{0:?} is no sampling; use conforming, vertices, uniform:COUNT or blue:COUNT, with an \
-     optional :SEED, and a count from 1 to 10000000, of blue noise to 1000000"
+    "{0:?} is no sampling; use conforming, conforming:COUNT, vertices, uniform:COUNT or blue:COUNT, the last \
+     two with an optional :SEED, and a count from 1 to 10000000, of blue noise to 1000000"
 )]
 pub struct ParseSamplingError(String);
 
@@ -69,10 +77,13 @@ impl FromStr for Sampling {
             return Ok(Self::MeshVertices);
         }
         if text == "conforming" {
-            return Ok(Self::Conforming);
+            return Ok(Self::default());
         }
         // Only now: the two kinds above have no count.
         let count = parts.next().and_then(|c| c.parse().ok()).ok_or_else(error)?;
+        if kind == Some("conforming") && parts.clone().next().is_none() && count <= MAX_SAMPLES {
+            return Ok(Self::Conforming { least: count });
+        }
         let seed = parts.next().map_or(Ok(0), str::parse).map_err(|_| error())?;
         match kind {
             _ if parts.next().is_some() || !(1..=MAX_SAMPLES).contains(&count) => Err(error()),
@@ -88,7 +99,7 @@ impl Sampling {
     /// own, as the vertices have. `count` is at least 1.
     pub fn with_count(self, count: usize) -> Self {
         match self {
-            Self::Conforming | Self::MeshVertices => Self::BlueNoise { count, seed: 0 },
+            Self::Conforming { .. } | Self::MeshVertices => Self::BlueNoise { count, seed: 0 },
             Self::AreaUniform { seed, .. } => Self::AreaUniform { count, seed },
             Self::BlueNoise { seed, .. } => Self::BlueNoise { count, seed },
         }
@@ -97,7 +108,7 @@ impl Sampling {
     /// The same sampling with another seed.
     pub fn with_seed(self, seed: u64) -> Self {
         match self {
-            Self::Conforming | Self::MeshVertices => self,
+            Self::Conforming { .. } | Self::MeshVertices => self,
             Self::AreaUniform { count, .. } => Self::AreaUniform { count, seed },
             Self::BlueNoise { count, .. } => Self::BlueNoise { count, seed },
         }
@@ -122,7 +133,8 @@ impl fmt::Display for Sampling {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (kind, count, seed) = match *self {
             Self::MeshVertices => return f.write_str("vertices"),
-            Self::Conforming => return f.write_str("conforming"),
+            Self::Conforming { least: 0 } => return f.write_str("conforming"),
+            Self::Conforming { least } => ("conforming", least, 0),
             Self::AreaUniform { count, seed } => ("uniform", count, seed),
             Self::BlueNoise { count, seed } => ("blue", count, seed),
         };
@@ -135,7 +147,7 @@ impl fmt::Display for Sampling {
 const CANDIDATES: usize = 5;
 
 /// Samples a surface. Exactly as many points as asked, in the unit of the mesh; none if the mesh
-/// has no area. [`Sampling::Conforming`] gives the vertices.
+/// has no area. `conforming` gives the vertices.
 ///
 /// # Panics
 /// If a face names a vertex that does not exist.
@@ -153,7 +165,7 @@ const CANDIDATES: usize = 5;
 /// ```
 pub fn sample(mesh: &TriMesh, sampling: &Sampling) -> Vec<Vec3> {
     match *sampling {
-        Sampling::Conforming | Sampling::MeshVertices => mesh.vertices.clone(),
+        Sampling::Conforming { .. } | Sampling::MeshVertices => mesh.vertices.clone(),
         Sampling::AreaUniform { count, seed } => {
             let mut areas = Areas::new(mesh);
             areas.points(count, seed).into_iter().map(|(point, _)| point).collect()

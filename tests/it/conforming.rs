@@ -21,7 +21,7 @@ fn shape_of(mesh: &TriMesh, sampling: Sampling) -> Shape {
 /// The conforming start of a surface, which must be right. Returns the number of added points with it.
 #[track_caller]
 fn right_start(name: &str, mesh: &TriMesh) -> (usize, MedialMesh) {
-    let shape = shape_of(mesh, Sampling::Conforming);
+    let shape = shape_of(mesh, Sampling::default());
     let start = shape.initial().unwrap_or_else(|error| panic!("{name}: {error}"));
     assert_eq!(shape.sampling_warning(), None, "{name}");
     assert_eq!(Some(betti(&start)), shape.expected_betti(), "{name}");
@@ -286,7 +286,7 @@ fn threads_order_and_scale_change_no_decision() {
 fn a_surface_that_crosses_itself_keeps_its_vertices_with_a_warning() {
     let crossing =
         shapes::joined(&[shapes::sphere(3), shapes::moved(shapes::sphere(3), |p| p + Vec3::X)]);
-    let shape = shape_of(&crossing, Sampling::Conforming);
+    let shape = shape_of(&crossing, Sampling::default());
     shape.initial().unwrap();
     assert_eq!(*shape.samples(), shape.mesh().vertices);
     let warning = shape.sampling_warning().unwrap();

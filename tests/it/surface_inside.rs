@@ -204,7 +204,7 @@ fn spacings(points: &[Vec3]) -> Vec<f64> {
 fn text_and_back() {
     for (text, sampling) in [
         ("vertices", Sampling::MeshVertices),
-        ("conforming", Sampling::Conforming),
+        ("conforming", Sampling::default()),
         ("uniform:20000", Sampling::AreaUniform { count: 20_000, seed: 0 }),
         ("blue:20000", Sampling::BlueNoise { count: 20_000, seed: 0 }),
         ("blue:12:7", Sampling::BlueNoise { count: 12, seed: 7 }),
