@@ -6,7 +6,7 @@
 //! inside that no primitive holds.
 //!
 //! 1. *Start.* The initial medial mesh, of `samples` samples at least, simplified by another method (Q-MAT) to
-//!    `start` spheres or three times the target, whichever is more (`start.rs`).
+//!    `start` spheres, five times the target up to 2,500, or three times it, whichever is most (`start.rs`).
 //! 2. *Residuals* (`goal.rs`): at samples of the surface `sigma`; at points of the primitives how far their
 //!    ball protrudes; at interior points how far they are from being held.
 //! 3. *Descent* (`rounds.rs`): Levenberg-Marquardt on all spheres at once for a power of the residuals,
@@ -244,7 +244,7 @@ medial::parameters! {
     pub struct TightParams {
         /// Weight of the mean of the squares next to the high powers: larger for a smaller mean error.
         lambda: f64 = 0.15, "pure number";
-        /// Spheres that the start is simplified to, unless three times the target are more.
+        /// Spheres that the start is simplified to, unless five times the target, up to 2,500, or three times it are more.
         start: usize = 1_200, "spheres";
         /// Samples of the initial medial mesh at least; a coarse surface gets more.
         samples: usize = 5_000, "samples";

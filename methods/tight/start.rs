@@ -20,6 +20,11 @@ use super::rounds::{Descent, LEAST_RADIUS};
 use super::{MANY, TightParams, collapse};
 use crate::Result;
 
+/// The start has this many times the target, but no more than so many for this reason: with three times 500 spheres the
+/// error was a sixth larger.
+const ENOUGH: usize = 5;
+const MOST_NEEDED: usize = 2_500;
+
 /// Samples of a surface that crosses itself, which has no conforming triangulation.
 const OF_CROSSING: usize = 20_000;
 
@@ -80,7 +85,8 @@ impl Start {
         diagnostics: &mut Diagnostics,
     ) -> Result<MedialMesh> {
         let initial = self.shape.initial()?;
-        let wanted = self.least.max(MANY.saturating_mul(count));
+        let [few, many] = [MANY, ENOUGH].map(|times| times.saturating_mul(count));
+        let wanted = self.least.max(few).max(many.min(MOST_NEEDED));
         let mesh = if initial.spheres.len()
             <= if self.shape.has_given_initial() { count } else { wanted }
         {
