@@ -54,7 +54,8 @@ impl Global {
 #[derive(Clone, Debug, Args)]
 pub struct SubstrateArguments {
     /// Boundary samples: `conforming` (the vertices, with points that make the topology right), `vertices`
-    /// (as in the papers), `uniform:COUNT` or `blue:COUNT` [default: conforming].
+    /// (as in the papers), `uniform:COUNT` or `blue:COUNT`; `conforming:COUNT` begins with so many at least
+    /// [default: conforming].
     #[arg(long, value_name = "SAMPLING")]
     pub sampling: Option<String>,
     /// Triangulation of the dual Voronoi polygons [default: fan].

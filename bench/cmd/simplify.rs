@@ -140,10 +140,10 @@ fn topology_warnings(result: &MedialMesh, shape: &Shape) -> Vec<String> {
     let Some(own) = topology_warning(complex::betti(result), expected) else { return Vec::new() };
     let initial = shape.initial().ok();
     let start = initial.and_then(|initial| topology_warning(complex::betti(&initial), expected));
-    let advice = match shape.options().sampling {
-        _ if shape.has_given_initial() => "",
-        Sampling::Conforming { .. } => "",
-        _ => "; try `--sampling conforming`",
+    let is_conforming = matches!(shape.options().sampling, Sampling::Conforming { .. });
+    let advice = match is_conforming || shape.has_given_initial() {
+        true => "",
+        false => "; try `--sampling conforming`",
     };
     let start =
         start.map(|start| format!("the initial medial mesh is not right either ({start}){advice}"));

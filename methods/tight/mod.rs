@@ -32,7 +32,7 @@
 //!   of the start. Those of the union are not looked at.
 //! - The error is measured at samples and by ascent from them; it is not certified. `lambda` weighs the
 //!   mean against the maximum.
-//! - No collapse, insertion or step makes two faces cross that did not (`Sheets`, `Guard`). Faces that cross at
+//! - No collapse, insertion or step makes two faces cross by more than 1e-6 that did not (`Sheets`, `Guard`). Faces that cross at
 //!   the start may stay crossed.
 //! - The result depends on the samples, hence on the seed and on the orientation of the input; docs/tight.md
 //!   has figures.

@@ -21,7 +21,7 @@ use super::{MANY, TightParams, collapse};
 use crate::Result;
 
 /// The start has this many times the target, but no more than so many for this reason: with three times 500 spheres the
-/// error was a sixth larger.
+/// mean error was a seventh larger.
 const ENOUGH: usize = 5;
 const MOST_NEEDED: usize = 2_500;
 

@@ -118,9 +118,9 @@ pub enum ConformingError {
 }
 
 impl Conforming {
-    /// Refines a closed, oriented surface until it has `least` points, by its longest edges, and the Delaunay
-    /// triangulation contains it. No round begins after `most` points were added for that. The same result for any number of threads. Cost:
-    /// `O(n log n)` expected, and `O(n)` for each round.
+    /// Halves the longest edges of a closed, oriented surface until it has `least` points. Then refines it until the
+    /// Delaunay triangulation contains it; no round of that begins after `most` points were added. The same
+    /// result for any number of threads. Cost: `O(n log n)` expected, and `O(n)` for each round.
     ///
     /// # Errors
     /// When the vertices do not span space, the surface touches or crosses itself, or the points do not
@@ -484,13 +484,8 @@ impl Skin {
         let groups: Vec<&[(u32, u32)]> = of_vertex.chunk_by(|a, b| a.0 == b.0).collect();
         let missing = groups.par_iter().with_min_len(64).flat_map_iter(|group| {
             let star = star(delaunay, group[0].0);
-            let is_facet = move |corners: [u32; 3]| {
-                star.iter().any(|&cell| {
-                    let v = delaunay.vertices(cell);
-                    corners.iter().all(|&corner| v.contains(&VertexId(corner)))
-                })
-            };
-            let is_missing = move |&(_, t): &(u32, u32)| !is_facet(self.triangles[t as usize]);
+            let is_missing =
+                move |&(_, t): &(u32, u32)| !any_has(delaunay, &star, self.triangles[t as usize]);
             group.iter().copied().filter(is_missing).map(|(_, t)| t)
         });
         let mut missing: Vec<u32> = missing.collect();
@@ -625,7 +620,7 @@ impl Skin {
         self.flip_by_angles(changed.into_iter().map(|t| t as usize));
     }
 
-    /// Halves the longest edges until there are so many points.
+    /// Halves the longest edges until there are `least` points.
     fn split_longest(&mut self, least: usize) {
         while self.points.len() < least {
             let length = |[a, b]: [u32; 2]| {
@@ -635,7 +630,6 @@ impl Skin {
             let mut all: Vec<(f64, [u32; 2])> = all.map(|edge| (length(edge), edge)).collect();
             all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
             let longest = all.first().map_or(0.0, |edge| edge.0);
-            // No edge is short enough to fall onto its ends.
             all.retain(|edge| edge.0 >= 0.5 * longest && edge.0 > 0.0);
             if all.is_empty() {
                 return;
@@ -829,6 +823,14 @@ fn star(triangulation: &Triangulation, vertex: u32) -> Vec<CellId> {
     star
 }
 
+/// Whether one of some cells has all of these corners.
+fn any_has<const N: usize>(delaunay: &Delaunay, cells: &[CellId], corners: [u32; N]) -> bool {
+    cells.iter().any(|&cell| {
+        let own = delaunay.vertices(cell);
+        corners.iter().all(|&corner| own.contains(&VertexId(corner)))
+    })
+}
+
 /// The cells around vertices of a triangulation, each searched once.
 struct Stars<'d> {
     delaunay: &'d Delaunay,
@@ -845,18 +847,14 @@ impl<'d> Stars<'d> {
         self.known.entry(vertex).or_insert_with(|| star(self.delaunay, vertex))
     }
 
-    fn has_facet(&mut self, [a, b, c]: [u32; 3]) -> bool {
+    fn has_facet(&mut self, corners: [u32; 3]) -> bool {
         let delaunay = self.delaunay;
-        let all = [a, b, c].map(VertexId);
-        self.around(a).iter().any(|&cell| {
-            let corners = delaunay.vertices(cell);
-            all.iter().all(|corner| corners.contains(corner))
-        })
+        any_has(delaunay, self.around(corners[0]), corners)
     }
 
     fn has_edge(&mut self, [a, b]: [u32; 2]) -> bool {
         let delaunay = self.delaunay;
-        self.around(a).iter().any(|&cell| delaunay.vertices(cell).contains(&VertexId(b)))
+        any_has(delaunay, self.around(a), [b])
     }
 }
 

@@ -591,5 +591,11 @@ mod tests {
             [a.min(b), a.max(b)]
         };
         assert_eq!(crossing_faces(&mesh), vec![pair([0, 1, 2], [4, 5, 6])]);
+        // In one plane up to rounding, although an edge passes through the other face.
+        let mut flat = mesh.clone();
+        for (sphere, z) in flat.spheres.iter_mut().zip([0.0, 0.0, 0.0, 0.0, -1e-12, 1e-12, 1e-12]) {
+            sphere.centre.z = z;
+        }
+        assert!(crossing_faces(&flat).is_empty());
     }
 }

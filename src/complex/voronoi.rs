@@ -165,8 +165,8 @@ impl CellSpheres {
     }
 }
 
-/// Takes cells off the inside that leave the dual complex as it is, up to homotopy. Those that stay remain
-/// in the list.
+/// Takes cells off the inside without which the dual complex keeps its homotopy type. The list keeps the
+/// others.
 fn leave_out(triangulation: &Triangulation, is_inside: &mut [bool], cells: &mut Vec<CellId>) {
     loop {
         let before = cells.len();
@@ -182,7 +182,7 @@ fn leave_out(triangulation: &Triangulation, is_inside: &mut [bool], cells: &mut 
 }
 
 /// Whether the neighbours inside of a cell, joined by the edges that are all inside, are a tree. Then the dual
-/// complex collapses to what is left of it without the cell.
+/// complex keeps its homotopy type without the cell.
 fn link_is_tree(triangulation: &Triangulation, is_inside: &[bool], cell: CellId) -> bool {
     let inside = |cell: CellId| is_inside.get(cell.index()) == Some(&true);
     let neighbours = triangulation.neighbours(cell).map(inside);

@@ -1,4 +1,4 @@
-//! Whether two triangles meet outside of the corners and sides that they share. Exact.
+//! Whether two triangles meet outside of the corners and sides that they share. Exact, but for [`triangles_cross`].
 //!
 //! Two triangles intersect if and only if an edge of one meets the other, both taken with their
 //! boundary. By the number of corners they share:

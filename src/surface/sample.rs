@@ -57,13 +57,14 @@ impl Default for Sampling {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{0:?} is no sampling; use conforming, conforming:COUNT, vertices, uniform:COUNT or blue:COUNT, the last \
-     two with an optional :SEED, and a count from 1 to 10000000, of blue noise to 1000000"
+     two with an optional :SEED, and a count from 1 to 10000000, of conforming and blue to 1000000"
 )]
 pub struct ParseSamplingError(String);
 
 /// Bound on the number of samples: more are surely a typing error.
 const MAX_SAMPLES: usize = 10_000_000;
-/// Bound for blue noise: elimination takes about two kilobytes for each sample.
+/// Bound for blue noise and conforming samples: elimination takes about two kilobytes for each, and refinement may
+/// add eight for each.
 const MAX_BLUE_SAMPLES: usize = 1_000_000;
 
 impl FromStr for Sampling {
@@ -81,7 +82,10 @@ impl FromStr for Sampling {
         }
         // Only now: the two kinds above have no count.
         let count = parts.next().and_then(|c| c.parse().ok()).ok_or_else(error)?;
-        if kind == Some("conforming") && parts.clone().next().is_none() && count <= MAX_SAMPLES {
+        if kind == Some("conforming")
+            && parts.clone().next().is_none()
+            && (1..=MAX_BLUE_SAMPLES).contains(&count)
+        {
             return Ok(Self::Conforming { least: count });
         }
         let seed = parts.next().map_or(Ok(0), str::parse).map_err(|_| error())?;

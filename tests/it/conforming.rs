@@ -32,8 +32,9 @@ fn right_start(name: &str, mesh: &TriMesh) -> (usize, MedialMesh) {
     let samples = shape.samples();
     assert_eq!(samples[..mesh.vertices.len()], shape.mesh().vertices, "{name}");
     let tree = shape.surface_tree().unwrap();
-    // Points are added on a surface whose edges may have been flipped.
-    assert!(tree.distance_batch(&samples).iter().all(|&d| d < 3e-3), "{name}: a sample off");
+    // Where flips bend the surface, points that are added are off the given one.
+    let most = if mesh.faces.len() < 1_000 { 2e-6 } else { 3e-3 };
+    assert!(tree.distance_batch(&samples).iter().all(|&d| d < most), "{name}: a sample off");
     (samples.len() - mesh.vertices.len(), (*start).clone())
 }
 
@@ -291,4 +292,20 @@ fn a_surface_that_crosses_itself_keeps_its_vertices_with_a_warning() {
     assert_eq!(*shape.samples(), shape.mesh().vertices);
     let warning = shape.sampling_warning().unwrap();
     assert!(warning.contains("crosses itself"), "{warning}");
+}
+
+#[test]
+fn a_coarse_surface_gets_the_samples_that_were_requested() {
+    let cube = shapes::cuboid(Vec3::ZERO, Vec3::ONE);
+    let shape = shape_of(&cube, "conforming:500".parse().unwrap());
+    assert_eq!(Some(betti(&shape.initial().unwrap())), shape.expected_betti());
+    let samples = shape.samples();
+    assert!((500..600).contains(&samples.len()), "{}", samples.len());
+    assert!(shape.surface_tree().unwrap().distance_batch(&samples).iter().all(|&d| d < 1e-12));
+    // Evenly: none of the halves that are left is long.
+    let spacing = |p: &Vec3| {
+        let others = samples.iter().filter(|q| *q != p);
+        others.map(|q| p.distance(*q)).fold(f64::INFINITY, f64::min)
+    };
+    assert!(samples.iter().all(|p| spacing(p) < 0.1));
 }

@@ -205,6 +205,7 @@ fn text_and_back() {
     for (text, sampling) in [
         ("vertices", Sampling::MeshVertices),
         ("conforming", Sampling::default()),
+        ("conforming:500", Sampling::Conforming { least: 500 }),
         ("uniform:20000", Sampling::AreaUniform { count: 20_000, seed: 0 }),
         ("blue:20000", Sampling::BlueNoise { count: 20_000, seed: 0 }),
         ("blue:12:7", Sampling::BlueNoise { count: 12, seed: 7 }),
