@@ -547,12 +547,9 @@ pub(super) fn clamp(mesh: &mut MedialMesh, goal: &Goal) {
 // ----------------------------------------------------------------------------
 // Steps of a few spheres: those around the places where the mesh was just edited.
 //
-// The spheres within [`RINGS`] edges of the places move, with the simplices that have one of them as a
+// The spheres of the places and their neighbours move, with the simplices that have one of them as a
 // corner. All other simplices stay, so for each sample their distance is one number. A step costs what the
 // samples around the places cost.
-
-/// Edges from a place to the spheres that move with it.
-const RINGS: usize = 2;
 
 /// Samples that the rest of the mesh serves are looked at up to this distance from the moving part.
 const REACH: f64 = 0.02;
@@ -625,16 +622,14 @@ impl Patch<'_> {
     }
 }
 
-/// Which spheres are at most [`RINGS`] edges away from a place.
+/// Which spheres are at a place or next to one. With their neighbours, too, the results were no better.
 fn around(mesh: &MedialMesh, places: &[u32]) -> Vec<bool> {
     let mut reached = vec![false; mesh.spheres.len()];
     places.iter().for_each(|&v| reached[v as usize] = true);
-    for _ in 0..RINGS {
-        let before = reached.clone();
-        for &[a, b] in &mesh.edges {
-            reached[a as usize] |= before[b as usize];
-            reached[b as usize] |= before[a as usize];
-        }
+    let own = reached.clone();
+    for &[a, b] in &mesh.edges {
+        reached[a as usize] |= own[b as usize];
+        reached[b as usize] |= own[a as usize];
     }
     reached
 }

@@ -81,7 +81,7 @@ const MANY: usize = 3;
 const POWER: f64 = 4.0;
 
 /// The share of spheres that a pass leaves, far from the target and near to it.
-const LEFT: [f64; 2] = [0.6, 0.8];
+const LEFT: [f64; 2] = [0.4, 0.6];
 
 /// Steps after a pass, far from the target and near to it.
 const STEPS: [usize; 2] = [2, 4];

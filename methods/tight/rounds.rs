@@ -278,7 +278,7 @@ const STIFF: f64 = 1e12;
 const REFUSED: usize = 4;
 
 /// A step that lessens the objective by a smaller share is the last.
-const SMALL: f64 = 1e-3;
+const SMALL: f64 = 2e-2;
 
 /// From this power on, balls may protrude by this share of the scale.
 const HIGH: f64 = 4.0;
