@@ -66,7 +66,7 @@ struct Served {
 
 impl Served {
     fn error(&self, signed: f64) -> f64 {
-        if self.depth < 0.0 { signed.abs() } else { uncovered(self.depth, signed) }
+        if self.depth < 0.0 { signed.abs() } else { uncovered(self.depth, signed, self.depth) }
     }
 }
 
@@ -161,7 +161,8 @@ impl<'a> Stars<'a> {
             face.iter().for_each(|&v| this.faces[v as usize].push(f));
         }
         let surface = points.samples.iter().map(|s| (s.point, s.weight, -1.0));
-        let interior = points.interior.iter().map(|x| (x.point, x.weight, x.depth));
+        let interior =
+            points.interior.iter().map(|x| (x.point, x.weight, x.depth.min(points.deep)));
         for ((point, weight, depth), found) in surface.chain(interior).zip(&residuals.nearest) {
             let mut served = Served { point, weight, depth, now: 0.0 };
             served.now = served.error(found.signed).powi(POWER);
@@ -605,7 +606,9 @@ impl Patch<'_> {
         let moving = part.signed_batch(&all);
         let staying =
             rest.map_or_else(|| vec![f64::INFINITY; all.len()], |rest| rest.signed_batch(&all));
-        let mut points = Points::default();
+        let is_near = |p: Vec3| (p - lo).min_element() > 0.0 && (hi - p).min_element() > 0.0;
+        let outside = self.points.outside.iter().copied().filter(|&p| is_near(p)).collect();
+        let mut points = Points { outside, deep: self.points.deep, ..Points::default() };
         let mut limits = vec![];
         for ((i, moving), staying) in kept.into_iter().zip(moving).zip(staying) {
             if moving > staying + REACH {

@@ -1,6 +1,8 @@
 //! The target of the union of the primitives: samples of the surface, points inside the solid, and
 //! depths of any point.
 
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
 use medial::Vec3;
@@ -17,8 +19,11 @@ use rayon::prelude::*;
 
 use crate::Result;
 
-/// Samples of the surface, below 500 spheres; twice as many from there on.
-const SAMPLES: usize = 10_000;
+/// Samples of the surface, below 500 spheres and from there on.
+const SAMPLES: [usize; 2] = [10_000, 12_000];
+
+/// Samples along sharp edges, a share of those. With a quarter of them, faces grew across holes of two meshes.
+const SHARE_OF_EDGES: f64 = 0.1;
 
 /// Samples of the surface from which the largest errors are searched, and three times as many of the union. More gave
 /// the same errors at 100 spheres.
@@ -32,6 +37,10 @@ const STREAM: u64 = 0x7469_6768_7421_0a0b;
 
 /// Weight of a vertex of the surface and of a point inside; an area-uniform sample has 1.
 pub(super) const ASIDE: f64 = 0.3;
+
+/// Cosine of the angle by which the surface turns at a sharp edge, and the least distance of samples along it.
+const SHARP: f64 = 0.866;
+const CLOSEST: f64 = 1e-3;
 
 /// Interior points that are residuals from the start.
 const INTERIOR: usize = 4_000;
@@ -72,6 +81,10 @@ pub(super) struct Points {
     pub samples: Vec<Sample>,
     /// Points that the union should hold.
     pub interior: Vec<Interior>,
+    /// Places outside that a union reached: balls there are watched for protruding.
+    pub outside: Vec<Vec3>,
+    /// Depth from which on an uncovered interior point counts alike.
+    pub deep: f64,
 }
 
 /// Depth of a point in the solid, negative outside, and its gradient.
@@ -116,7 +129,7 @@ impl Goal {
     /// The points that residuals are made for, when `spheres` are left.
     pub fn points(&self, spheres: usize) -> Points {
         let Self { surface, pool, seed, .. } = self;
-        let count = if spheres < 500 { SAMPLES } else { 2 * SAMPLES };
+        let count = if spheres < 500 { SAMPLES[0] } else { SAMPLES[1] };
         let spread = sample(surface, &Sampling::BlueNoise { count, seed: seed ^ STREAM });
         let mut used = vec![false; surface.vertices.len()];
         surface.faces.iter().flatten().for_each(|&v| used[v as usize] = true);
@@ -130,10 +143,12 @@ impl Goal {
         let stride = (pool.len() / INTERIOR).max(1);
         let interior = pool.iter().step_by(stride).copied().collect();
         // Along a curve: the primitive of a sample mostly serves the next one.
-        let samples: Vec<Sample> = samples.chain(vertices).collect();
+        let along = along_sharp_edges(surface, SHARE_OF_EDGES * count as f64);
+        let along = along.into_iter().map(|point| Sample { point, weight: ASIDE });
+        let samples: Vec<Sample> = samples.chain(vertices).chain(along).collect();
         let places: Vec<Vec3> = samples.iter().map(|sample| sample.point).collect();
         let samples = morton_order(&places).into_iter().map(|(_, i)| samples[i as usize]).collect();
-        Points { samples, interior }
+        Points { samples, interior, outside: Vec::new(), deep: DEEP }
     }
 
     /// A search for the largest errors of a medial mesh.
@@ -297,6 +312,41 @@ impl Goal {
     }
 }
 
+/// Points along the edges at which the surface turns by more than 30 degrees, about `count` of them, evenly.
+fn along_sharp_edges(surface: &TriMesh, count: f64) -> Vec<Vec3> {
+    let normal = |f: u32| {
+        let [a, b, c] = surface.triangle(f as usize);
+        (b - a).cross(c - a).normalize_or_zero()
+    };
+    let mut first = HashMap::new();
+    let mut sharp = Vec::new();
+    for (f, face) in (0..).zip(&surface.faces) {
+        for k in 0..3 {
+            let (a, b) = (face[k], face[(k + 1) % 3]);
+            let ends = [a.min(b), a.max(b)];
+            match first.entry(ends) {
+                Entry::Vacant(entry) => {
+                    entry.insert(f);
+                }
+                Entry::Occupied(entry) => {
+                    if normal(*entry.get()).dot(normal(f)) < SHARP {
+                        sharp.push(ends.map(|v| surface.vertices[v as usize]));
+                    }
+                }
+            }
+        }
+    }
+    let length: f64 = sharp.iter().map(|[a, b]| a.distance(*b)).sum();
+    let spacing = (length / count).max(CLOSEST);
+    let mut left = 0.5;
+    let mut points = Vec::new();
+    for [a, b] in sharp {
+        let n = whole_points(a.distance(b) / spacing, &mut left);
+        points.extend((0..n).map(|k| a.lerp(b, (k as f64 + 0.5) / n as f64)));
+    }
+    points
+}
+
 pub(super) fn refused(error: MetricError) -> SimplifyError {
     SimplifyError::Failed(error.to_string())
 }
@@ -310,8 +360,8 @@ pub(super) fn refused(error: MetricError) -> SimplifyError {
 // `d sigma / d c_j = -a_j u`, `d sigma / d r_j = -a_j`. The weights `a` may be held, because `sigma` is a
 // minimum over them (the envelope theorem).
 
-/// Depth from which on an uncovered interior point counts alike.
-const DEEP: f64 = 0.02;
+/// The first of these depths.
+pub(super) const DEEP: f64 = 0.02;
 
 /// Weight of a point of the medial mesh whose ball may protrude.
 const PROTRUDING: f64 = 0.3;
@@ -362,14 +412,14 @@ pub(super) struct Residuals {
 
 /// How much an interior point of a depth is uncovered, if positive.
 #[inline]
-pub(super) fn uncovered(depth: f64, signed: f64) -> f64 {
-    (2.0 * signed + depth.min(DEEP)).max(0.0)
+pub(super) fn uncovered(depth: f64, signed: f64, deep: f64) -> f64 {
+    (2.0 * signed + depth.min(deep)).max(0.0)
 }
 
 /// The signed distance from which on an interior point is not uncovered.
 #[inline]
-pub(super) fn held_from(depth: f64) -> f64 {
-    -0.5 * depth.min(DEEP)
+pub(super) fn held_from(depth: f64, deep: f64) -> f64 {
+    -0.5 * depth.min(deep)
 }
 
 /// The vertices of a simplex, and how many they are.
@@ -446,6 +496,23 @@ fn whole_points(size: f64, left: &mut f64) -> usize {
     (whole as usize).min(1000)
 }
 
+/// The points of a medial mesh whose balls are nearest to some places.
+///
+/// # Errors
+/// When the medial mesh has no union.
+pub(super) fn nearest_balls(mesh: &MedialMesh, places: &[Vec3]) -> Result<Vec<Held>> {
+    if places.is_empty() {
+        return Ok(Vec::new());
+    }
+    let hulls = Hulls::new(mesh);
+    let found = union_of(mesh)?.deepest_batch_near(places, &[], |_| None);
+    let held = places.iter().zip(found).map(|(&p, NearestPrimitive { primitive, .. })| {
+        let (weights, _) = hulls.derivative(mesh, p, primitive);
+        Held { primitive, weights, known: None }
+    });
+    Ok(held.collect())
+}
+
 /// Points whose balls are watched for protruding, for a mesh that is a `share` of the whole.
 pub(super) fn places(mesh: &MedialMesh, share: f64) -> Vec<Held> {
     spread_over(mesh, (share * HELD as f64) as usize)
@@ -472,7 +539,7 @@ pub(super) fn residuals(
     let count = points.samples.len();
     // A primitive that holds an interior point deeply enough is accepted: no deeper one is searched.
     let nearest = union.deepest_batch_near(&places, near, |i| {
-        i.checked_sub(count).map(|i| held_from(points.interior[i].depth))
+        i.checked_sub(count).map(|i| held_from(points.interior[i].depth, points.deep))
     });
     let hulls = Hulls::new(mesh);
     let limits = limits.iter().copied().chain(std::iter::repeat(f64::INFINITY));
@@ -484,7 +551,7 @@ pub(super) fn residuals(
             Some(&Sample { point, weight }) => (point, weight, signed, 1.0),
             None => {
                 let Interior { point, depth, weight } = points.interior[i - count];
-                (point, weight, uncovered(depth, signed), 2.0)
+                (point, weight, uncovered(depth, signed, points.deep), 2.0)
             }
         };
         if i >= count && error <= 0.0 {

@@ -243,7 +243,7 @@ medial::parameters! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct TightParams {
         /// Weight of the mean of the squares next to the high powers: larger for a smaller mean error.
-        lambda: f64 = 0.15, "pure number";
+        lambda: f64 = 0.4, "pure number";
         /// Spheres that the start is simplified to, unless five times the target, up to 2,500, or three times it are more.
         start: usize = 1_200, "spheres";
         /// Samples of the initial medial mesh at least; a coarse surface gets more.

@@ -5,8 +5,9 @@
 //!    or 32 plus `lambda` times the squares. Witnesses are found by local ascent on both sides, and
 //!    among the points inside.
 //! 3. Swaps of a few spheres, and later of one, from the best state so far. Only the spheres around them move at
-//!    first; where that lowers the sum of the powers all spheres take a few steps, and the error is
-//!    measured again.
+//!    first; where that lowers the sum of the powers all spheres take a step, and the error is measured. If it is
+//!    little larger than before, its places join as witnesses, and a few more steps follow: without this, most swaps
+//!    that lower the errors at samples fail by an error between them.
 //! 4. Rounds as in 2, with the witnesses that were found meanwhile.
 //!
 //! The result is the state of the least measured error.
@@ -21,8 +22,8 @@ use medial::simplifier::{Diagnostics, RunContext};
 use super::TightParams;
 use super::collapse::{Guard, Still, clamp};
 use super::goal::{
-    ASIDE, Goal, Held, Interior, Points, Residuals, Row, Sample, held_from, places, refused,
-    residuals, uncovered, union_of, vertices,
+    ASIDE, DEEP, Goal, Held, Interior, Points, Residuals, Row, Sample, held_from, nearest_balls,
+    places, refused, residuals, uncovered, union_of, vertices,
 };
 use super::start::swapped;
 use crate::Result;
@@ -43,7 +44,7 @@ const WITNESS: f64 = 0.6;
 const WITNESSES: usize = 300;
 
 /// Of witnesses in a cube of this side one is enough: the errors of the others are hardly different.
-const APART: f64 = 0.003;
+const APART: f64 = 0.001;
 
 /// A round that lowers the error by a smaller share did not help.
 const GAIN: f64 = 0.01;
@@ -56,7 +57,7 @@ const WORSE: f64 = 1.15;
 const PATIENCE: usize = 2;
 
 /// Most swaps that are tried, and swaps without a gain, one after the other, that end the search.
-const SWAPS: usize = 60;
+const SWAPS: usize = 40;
 const FAILURES: usize = 8;
 
 /// One of this number of spheres is swapped at first, later fewer, and then one at a time.
@@ -65,8 +66,17 @@ const SPHERES: usize = 25;
 /// A swap that raises the objective more than this many times is given up before all spheres take steps.
 const HOPELESS: f64 = 2.0;
 
-/// Steps of all spheres after a swap.
-const AFTER: usize = 4;
+/// Steps of all spheres after a swap, and more of them if its error is less than this many times the least.
+const AFTER: [usize; 2] = [1, 4];
+const CHANCE: f64 = 1.6;
+
+/// A swap that leaves the error within this many times the least, at another place, is kept if the objective is less
+/// than this many times what it was.
+const EQUAL: f64 = 1.002;
+const LOWER: f64 = 0.97;
+
+/// Interior points deeper than this many times the error count alike.
+const DEEPER: f64 = 3.0;
 
 /// The last rounds on one goal.
 pub(super) struct Polish<'a> {
@@ -84,12 +94,12 @@ pub(super) struct State {
     pub error: f64,
 }
 
-impl Polish<'_> {
+impl<'a> Polish<'a> {
     /// Runs all rounds.
     ///
     /// # Errors
     /// When the run is cancelled, or the mesh cannot be measured.
-    pub fn run(&self, mut descent: Descent<'_>, diagnostics: &mut Diagnostics) -> Result<State> {
+    pub fn run(&self, mut descent: Descent<'a>, diagnostics: &mut Diagnostics) -> Result<State> {
         for (power, steps) in WARM {
             descent.run(Objective::power(power, descent.largest()), steps, self.run)?;
         }
@@ -98,13 +108,14 @@ impl Polish<'_> {
             search: self.goal.peaks().map_err(refused)?,
             seen: HashSet::new(),
         };
-        let (mut points, mesh) = (descent.points, descent.mesh);
-        let mut best = self.rounds(mesh, &mut points, &mut witnesses)?;
+        let error = witnesses.measure(&mut descent)?;
+        let (mut best, points) = self.rounds(descent, error, &mut witnesses)?;
         if self.swaps {
-            let kept = self.swapped(&mut best, &mut points, &mut witnesses)?;
-            diagnostics.count("swaps_that_helped", kept);
+            let from = self.at(&best, points)?;
+            let (from, helped) = self.swapped(from, &mut best, &mut witnesses)?;
+            diagnostics.count("swaps_that_helped", helped);
             // With all the witnesses that were found meanwhile.
-            let again = self.rounds(best.mesh.clone(), &mut points, &mut witnesses)?;
+            let (again, _) = self.rounds(from, best.error, &mut witnesses)?;
             if again.error < best.error {
                 best = again;
             }
@@ -112,82 +123,109 @@ impl Polish<'_> {
         Ok(best)
     }
 
-    /// Step 2. Returns the best state.
+    /// A descent from a state.
+    fn at(&self, state: &State, mut points: Points) -> Result<Descent<'a>> {
+        points.deep = DEEP.min(DEEPER * state.error);
+        Descent::new(self.goal, points, state.mesh.clone())
+    }
+
+    /// Step 2. Returns the best state, and the points with all witnesses.
     fn rounds(
         &self,
-        mesh: MedialMesh,
-        points: &mut Points,
+        from: Descent<'a>,
+        mut error: f64,
         witnesses: &mut Witnesses<'_>,
-    ) -> Result<State> {
-        let error = witnesses.measure(&mesh, points)?;
-        let mut now = State { mesh, error };
-        let mut best = now.clone();
+    ) -> Result<(State, Points)> {
+        let mut best = State { mesh: from.mesh, error };
+        let mut descent = self.at(&best, from.points)?;
         let mut idle = 0;
         for round in 0..self.params.rounds {
-            let mut descent = Descent::new(self.goal, std::mem::take(points), now.mesh)?;
             let power = POWERS[usize::from(round >= 2)];
-            descent.run(
-                self.objective(power, now.error.min(WORSE * best.error)),
-                STEPS,
-                self.run,
-            )?;
-            *points = descent.points;
-            let error = witnesses.measure(&descent.mesh, points)?;
-            now = State { mesh: descent.mesh, error };
+            let objective = self.objective(power, error.min(WORSE * best.error));
+            descent.run(objective, STEPS, self.run)?;
+            error = witnesses.measure(&mut descent)?;
             idle = if error < (1.0 - GAIN) * best.error { 0 } else { idle + 1 };
             if error < best.error {
-                best = now.clone();
+                best = State { mesh: descent.mesh.clone(), error };
             }
             if idle > PATIENCE {
                 break;
             }
         }
-        Ok(best)
+        Ok((best, descent.points))
     }
 
-    /// Step 3. Returns how many swaps helped.
+    /// Step 3, from the best state. Returns the new one with all witnesses, and how many swaps helped.
     fn swapped(
         &self,
+        mut from: Descent<'a>,
         best: &mut State,
-        points: &mut Points,
         witnesses: &mut Witnesses<'_>,
-    ) -> Result<usize> {
+    ) -> Result<(Descent<'a>, usize)> {
         let mut each = (best.mesh.spheres.len() / SPHERES).max(1);
         let (mut skipped, mut idle, mut helped) = (0, 0, 0);
-        let mut from = Descent::new(self.goal, std::mem::take(points), best.mesh.clone())?;
         for _ in 0..SWAPS {
             let objective = self.objective(POWERS[1], best.error);
             let trial = swapped(&from, each, skipped, self.run)?;
-            let lower =
-                |trial: &Descent<'_>| trial.value(&objective) < HOPELESS * from.value(&objective);
-            let mut is_better = false;
-            if let Some(mut trial) = trial.filter(lower) {
-                trial.run(objective, AFTER, self.run)?;
-                if trial.value(&objective) < from.value(&objective) {
-                    let mut points = trial.points;
-                    let error = witnesses.measure(&trial.mesh, &mut points)?;
-                    is_better = error < best.error;
-                    if is_better {
-                        idle = if error < (1.0 - GAIN) * best.error { 0 } else { idle + 1 };
-                        *best = State { mesh: trial.mesh, error };
-                        helped += 1;
-                    }
-                    from = Descent::new(self.goal, points, best.mesh.clone())?;
+            let mut error = f64::INFINITY;
+            let mut is_kept = false;
+            if let Some(mut trial) = trial {
+                error = self.tried(&mut trial, from.value(&objective), best.error, witnesses)?;
+                is_kept = error < best.error;
+                if !is_kept {
+                    from.join_new_of(&trial.points)?;
+                    // The largest error is at another place, which is next.
+                    is_kept = error <= EQUAL * best.error
+                        && trial.value(&objective) < LOWER * from.value(&objective);
+                }
+                if is_kept {
+                    from = trial;
                 }
             }
-            if is_better {
-                skipped = 0;
-            } else {
-                idle += 1;
+            idle = if error < (1.0 - GAIN) * best.error { 0 } else { idle + 1 };
+            if error < best.error {
+                *best = State { mesh: from.mesh.clone(), error };
+            }
+            if is_kept {
+                (helped, skipped) = (helped + 1, 0);
+            } else if each > 1 {
                 // Fewer at once, then one at another place.
-                if each > 1 { each /= 2 } else { skipped += 1 }
+                each /= 2;
+            } else {
+                skipped += 1;
             }
             if idle >= FAILURES {
                 break;
             }
         }
-        *points = from.points;
-        Ok(helped)
+        Ok((from, helped))
+    }
+
+    /// The measured error after a swap and steps of all spheres; infinite if the value is not below `value`.
+    ///
+    /// Where it is little larger than the least so far, mostly at places without a sample, the witnesses of these
+    /// places join, and a few steps more are taken.
+    fn tried(
+        &self,
+        trial: &mut Descent<'a>,
+        value: f64,
+        least: f64,
+        witnesses: &mut Witnesses<'_>,
+    ) -> Result<f64> {
+        let objective = self.objective(POWERS[1], least);
+        if trial.value(&objective) > HOPELESS * value {
+            return Ok(f64::INFINITY);
+        }
+        trial.run(objective, AFTER[0], self.run)?;
+        if trial.value(&objective) > value {
+            return Ok(f64::INFINITY);
+        }
+        let mut error = witnesses.measure(trial)?;
+        if error >= least && error < CHANCE * least {
+            trial.run(objective, AFTER[1], self.run)?;
+            error = witnesses.measure(trial)?;
+        }
+        Ok(error)
     }
 
     /// A little below the error counts as one, so that larger ones weigh heavily.
@@ -205,13 +243,14 @@ struct Witnesses<'a> {
 }
 
 impl Witnesses<'_> {
-    /// The error of a mesh, both ways. Where it is large, samples join `points`.
-    fn measure(&mut self, mesh: &MedialMesh, points: &mut Points) -> Result<f64> {
+    /// The error of a mesh, both ways. Where it is large, samples join.
+    fn measure(&mut self, descent: &mut Descent<'_>) -> Result<f64> {
         let Self { goal, search, .. } = self;
-        let peaks = search.of(mesh).map_err(refused)?;
+        let deep = descent.points.deep;
+        let peaks = search.of(&descent.mesh).map_err(refused)?;
         let pool: Vec<Vec3> = goal.pool.iter().map(|inside| inside.point).collect();
-        let nearest =
-            union_of(mesh)?.deepest_batch_near(&pool, &[], |i| Some(held_from(goal.pool[i].depth)));
+        let enough = |i: usize| Some(held_from(goal.pool[i].depth, deep));
+        let nearest = union_of(&descent.mesh)?.deepest_batch_near(&pool, &[], enough);
         let signed: Vec<f64> = nearest.iter().map(|nearest| nearest.signed).collect();
         // The union's boundary at a distance `sigma` from a point that it does not hold is as deep as that
         // point, less `sigma`. This finds pockets that samples of the boundary miss.
@@ -222,27 +261,24 @@ impl Witnesses<'_> {
             let large = peaks.iter().take_while(|peak| peak.distance > WITNESS * error);
             large.map(|peak| peak.point).collect()
         });
-        let on_surface = self.new_ones(0, forward);
-        points.samples.extend(on_surface.into_iter().map(|point| Sample { point, weight: 1.0 }));
-        let exposed = self.new_ones(1, reverse);
-        for (&point, depth) in exposed.iter().zip(self.goal.depths(&exposed)) {
-            // Boundary inside the solid is a pocket. Boundary outside protrudes, which other residuals see.
-            if depth.value > 0.0 {
-                points.interior.push(Interior { point, depth: depth.value, weight: 1.0 });
-            }
-        }
-        let mut gaps: Vec<(f64, &Interior)> = (self.goal.pool.iter().zip(&signed))
-            .map(|(inside, &signed)| (uncovered(inside.depth, signed), inside))
+        let mut gaps: Vec<(f64, Vec3)> = (self.goal.pool.iter().zip(&signed))
+            .map(|(inside, &signed)| (uncovered(inside.depth, signed, deep), inside.point))
             .filter(|&(gap, _)| gap > WITNESS * error)
             .collect();
         gaps.sort_by(|x, y| y.0.total_cmp(&x.0));
-        let gaps = self.new_ones(2, gaps.into_iter().map(|(_, inside)| inside.point).collect());
-        let depths = self.goal.depths(&gaps);
-        points.interior.extend(gaps.into_iter().zip(depths).map(|(point, depth)| Interior {
-            point,
-            depth: depth.value,
-            weight: ASIDE,
-        }));
+        let on_surface = self.new_ones(0, forward);
+        let samples = on_surface.into_iter().map(|point| Sample { point, weight: 1.0 }).collect();
+        let exposed = self.new_ones(1, reverse);
+        let gaps = self.new_ones(2, gaps.into_iter().map(|(_, point)| point).collect());
+        // Boundary inside the solid is a pocket. Boundary outside protrudes.
+        let weights = exposed.iter().map(|_| 1.0).chain(gaps.iter().map(|_| ASIDE));
+        let places = [&exposed[..], &gaps].concat();
+        let depths = self.goal.depths(&places).into_iter().map(|depth| depth.value);
+        let places = places.into_iter().zip(depths).zip(weights);
+        let places = places.map(|((point, depth), weight)| Interior { point, depth, weight });
+        let (interior, outside): (Vec<_>, Vec<_>) = places.partition(|place| place.depth > 0.0);
+        let outside = outside.into_iter().map(|place| place.point).collect();
+        descent.join(Points { samples, interior, outside, deep })?;
         Ok(error)
     }
 
@@ -377,11 +413,44 @@ impl<'a> Descent<'a> {
         let Rest { fixed, limits, still } = rest;
         clamp(&mut mesh, goal);
         let mut held = places(&mesh, share);
+        held.extend(nearest_balls(&mesh, &points.outside)?);
         let residuals = residuals(&mesh, goal, &points, &limits, &[], 0.0, &mut held)?;
         let pattern = Pattern::new(mesh.spheres.len(), &mesh.edges);
         let guard = Guard::new(&mesh, still);
         let damping = FIRST_DAMPING;
         Ok(Self { goal, points, mesh, residuals, held, fixed, limits, guard, pattern, damping })
+    }
+
+    /// Adds points, with their residuals.
+    ///
+    /// # Errors
+    /// When the mesh has no union.
+    pub fn join(&mut self, more: Points) -> Result<()> {
+        let Self { goal, points, mesh, held, residuals: Residuals { rows, nearest }, .. } = self;
+        let mut watched = nearest_balls(mesh, &more.outside)?;
+        let mut found = residuals(mesh, goal, &more, &[], &[], 0.0, &mut watched)?;
+        held.extend(watched);
+        rows.append(&mut found.rows);
+        let of_interior = found.nearest.split_off(more.samples.len());
+        let at = points.samples.len();
+        nearest.splice(at..at, found.nearest);
+        nearest.extend(of_interior);
+        points.samples.extend(more.samples);
+        points.interior.extend(more.interior);
+        points.outside.extend(more.outside);
+        Ok(())
+    }
+
+    /// Adds the points that others have more.
+    ///
+    /// # Errors
+    /// When the mesh has no union.
+    pub fn join_new_of(&mut self, others: &Points) -> Result<()> {
+        let Points { samples, interior, outside, deep } = &self.points;
+        let samples = others.samples[samples.len()..].to_vec();
+        let interior = others.interior[interior.len()..].to_vec();
+        let outside = others.outside[outside.len()..].to_vec();
+        self.join(Points { samples, interior, outside, deep: *deep })
     }
 
     /// The largest error of a residual.
