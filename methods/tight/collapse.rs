@@ -58,7 +58,7 @@ struct Priced {
 struct Served {
     point: Vec3,
     weight: f64,
-    /// Depth of an interior point, negative for a sample of the surface.
+    /// Counted depth of an interior point, negative for a sample of the surface.
     depth: f64,
     /// Its error to [`POWER`] as it is now.
     now: f64,
@@ -66,7 +66,7 @@ struct Served {
 
 impl Served {
     fn error(&self, signed: f64) -> f64 {
-        if self.depth < 0.0 { signed.abs() } else { uncovered(self.depth, signed, self.depth) }
+        if self.depth < 0.0 { signed.abs() } else { uncovered(self.depth, signed) }
     }
 }
 

@@ -2,7 +2,6 @@
 //! depths of any point.
 
 use std::collections::HashMap;
-use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
 use medial::Vec3;
@@ -22,7 +21,7 @@ use crate::Result;
 /// Samples of the surface, below 500 spheres and from there on.
 const SAMPLES: [usize; 2] = [10_000, 12_000];
 
-/// Samples along sharp edges, a share of those. With a quarter of them, faces grew across holes of two meshes.
+/// Samples along sharp edges, a share of those. With a quarter, a face grew across a hole of `abc_bracket`.
 const SHARE_OF_EDGES: f64 = 0.1;
 
 /// Samples of the surface from which the largest errors are searched, and three times as many of the union. More gave
@@ -142,10 +141,10 @@ impl Goal {
         let samples = spread.into_iter().map(|point| Sample { point, weight: 1.0 });
         let stride = (pool.len() / INTERIOR).max(1);
         let interior = pool.iter().step_by(stride).copied().collect();
-        // Along a curve: the primitive of a sample mostly serves the next one.
-        let along = along_sharp_edges(surface, SHARE_OF_EDGES * count as f64);
+        let along = self.along_sharp_edges(SHARE_OF_EDGES * count as f64);
         let along = along.into_iter().map(|point| Sample { point, weight: ASIDE });
         let samples: Vec<Sample> = samples.chain(vertices).chain(along).collect();
+        // Along a curve: the primitive of a sample mostly serves the next one.
         let places: Vec<Vec3> = samples.iter().map(|sample| sample.point).collect();
         let samples = morton_order(&places).into_iter().map(|(_, i)| samples[i as usize]).collect();
         Points { samples, interior, outside: Vec::new(), deep: DEEP }
@@ -266,6 +265,30 @@ impl Goal {
         (b - a).cross(c - a).normalize_or_zero()
     }
 
+    /// Points along the edges at which the surface turns by more than 30 degrees, about `count` of them, evenly.
+    pub fn along_sharp_edges(&self, count: f64) -> Vec<Vec3> {
+        let mut first = HashMap::new();
+        let mut sharp = Vec::new();
+        for (f, &[a, b, c]) in (0..).zip(&self.surface.faces) {
+            for [a, b] in [[a, b], [b, c], [c, a]] {
+                let ends = [a.min(b), a.max(b)];
+                let other = *first.entry(ends).or_insert(f);
+                if other != f && self.normal(other).dot(self.normal(f)) < SHARP {
+                    sharp.push(ends.map(|v| self.surface.vertices[v as usize]));
+                }
+            }
+        }
+        let length: f64 = sharp.iter().map(|[a, b]| a.distance(*b)).sum();
+        let spacing = (length / count).max(CLOSEST);
+        let mut left = 0.5;
+        let mut points = Vec::new();
+        for [a, b] in sharp {
+            let n = whole_points(a.distance(b) / spacing, &mut left);
+            points.extend((0..n).map(|k| a.lerp(b, (k as f64 + 0.5) / n as f64)));
+        }
+        points
+    }
+
     /// At most `count` points inside: as many random ones in each cell of a grid that reaches the solid.
     fn points_inside(&self, count: usize) -> Vec<Interior> {
         let (lo, hi) = self.surface.bounding_box().unwrap_or_default();
@@ -312,41 +335,6 @@ impl Goal {
     }
 }
 
-/// Points along the edges at which the surface turns by more than 30 degrees, about `count` of them, evenly.
-fn along_sharp_edges(surface: &TriMesh, count: f64) -> Vec<Vec3> {
-    let normal = |f: u32| {
-        let [a, b, c] = surface.triangle(f as usize);
-        (b - a).cross(c - a).normalize_or_zero()
-    };
-    let mut first = HashMap::new();
-    let mut sharp = Vec::new();
-    for (f, face) in (0..).zip(&surface.faces) {
-        for k in 0..3 {
-            let (a, b) = (face[k], face[(k + 1) % 3]);
-            let ends = [a.min(b), a.max(b)];
-            match first.entry(ends) {
-                Entry::Vacant(entry) => {
-                    entry.insert(f);
-                }
-                Entry::Occupied(entry) => {
-                    if normal(*entry.get()).dot(normal(f)) < SHARP {
-                        sharp.push(ends.map(|v| surface.vertices[v as usize]));
-                    }
-                }
-            }
-        }
-    }
-    let length: f64 = sharp.iter().map(|[a, b]| a.distance(*b)).sum();
-    let spacing = (length / count).max(CLOSEST);
-    let mut left = 0.5;
-    let mut points = Vec::new();
-    for [a, b] in sharp {
-        let n = whole_points(a.distance(b) / spacing, &mut left);
-        points.extend((0..n).map(|k| a.lerp(b, (k as f64 + 0.5) / n as f64)));
-    }
-    points
-}
-
 pub(super) fn refused(error: MetricError) -> SimplifyError {
     SimplifyError::Failed(error.to_string())
 }
@@ -360,7 +348,7 @@ pub(super) fn refused(error: MetricError) -> SimplifyError {
 // `d sigma / d c_j = -a_j u`, `d sigma / d r_j = -a_j`. The weights `a` may be held, because `sigma` is a
 // minimum over them (the envelope theorem).
 
-/// The first of these depths.
+/// Depth from which on an uncovered interior point counts alike, before the rounds.
 pub(super) const DEEP: f64 = 0.02;
 
 /// Weight of a point of the medial mesh whose ball may protrude.
@@ -410,16 +398,16 @@ pub(super) struct Residuals {
     pub nearest: Vec<NearestPrimitive>,
 }
 
-/// How much an interior point of a depth is uncovered, if positive.
+/// How much an interior point is uncovered, if positive, of a depth that counts.
 #[inline]
-pub(super) fn uncovered(depth: f64, signed: f64, deep: f64) -> f64 {
-    (2.0 * signed + depth.min(deep)).max(0.0)
+pub(super) fn uncovered(depth: f64, signed: f64) -> f64 {
+    (2.0 * signed + depth).max(0.0)
 }
 
 /// The signed distance from which on an interior point is not uncovered.
 #[inline]
-pub(super) fn held_from(depth: f64, deep: f64) -> f64 {
-    -0.5 * depth.min(deep)
+pub(super) fn held_from(depth: f64) -> f64 {
+    -0.5 * depth
 }
 
 /// The vertices of a simplex, and how many they are.
@@ -539,7 +527,7 @@ pub(super) fn residuals(
     let count = points.samples.len();
     // A primitive that holds an interior point deeply enough is accepted: no deeper one is searched.
     let nearest = union.deepest_batch_near(&places, near, |i| {
-        i.checked_sub(count).map(|i| held_from(points.interior[i].depth, points.deep))
+        i.checked_sub(count).map(|i| held_from(points.interior[i].depth.min(points.deep)))
     });
     let hulls = Hulls::new(mesh);
     let limits = limits.iter().copied().chain(std::iter::repeat(f64::INFINITY));
@@ -551,7 +539,7 @@ pub(super) fn residuals(
             Some(&Sample { point, weight }) => (point, weight, signed, 1.0),
             None => {
                 let Interior { point, depth, weight } = points.interior[i - count];
-                (point, weight, uncovered(depth, signed, points.deep), 2.0)
+                (point, weight, uncovered(depth.min(points.deep), signed), 2.0)
             }
         };
         if i >= count && error <= 0.0 {

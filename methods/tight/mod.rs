@@ -7,7 +7,7 @@
 //!
 //! 1. *Start.* The initial medial mesh, of `samples` samples at least, simplified by another method (Q-MAT) to
 //!    `start` spheres, five times the target up to 2,500, or three times it, whichever is most (`start.rs`).
-//! 2. *Residuals* (`goal.rs`): at samples of the surface `sigma`; at points of the primitives how far their
+//! 2. *Residuals* (`goal.rs`): at samples of the surface and along its sharp edges `sigma`; at points of the primitives how far their
 //!    ball protrudes; at interior points how far they are from being held.
 //! 3. *Descent* (`rounds.rs`): Levenberg-Marquardt on all spheres at once for a power of the residuals,
 //!    with a sparse Cholesky factorisation. A step that would take a centre out of the
@@ -17,7 +17,8 @@
 //! 5. *Swap* (`start.rs`): spheres are inserted where the error is largest, and as many edges collapsed
 //!    where it hurts least. Only the spheres around them move then (`Patch`).
 //! 6. *Rounds* (`rounds.rs`): steps of 3 at powers up to 32, between which the largest errors, found by
-//!    local ascent on both sides, join the samples; then swaps as in 5, and rounds again. The state
+//!    local ascent on both sides, join the samples, and balls are watched where the union came out of the solid;
+//!    then swaps as in 5, each with a second chance, and rounds again. The state
 //!    with the least measured error is the result.
 //!
 //! # Notation

@@ -213,11 +213,13 @@ impl<'a> Polish<'a> {
         witnesses: &mut Witnesses<'_>,
     ) -> Result<f64> {
         let objective = self.objective(POWERS[1], least);
-        if trial.value(&objective) > HOPELESS * value {
+        // A value that is not a number is not below.
+        let is_below = |trial: &Descent<'_>, times: f64| trial.value(&objective) < times * value;
+        if !is_below(trial, HOPELESS) {
             return Ok(f64::INFINITY);
         }
         trial.run(objective, AFTER[0], self.run)?;
-        if trial.value(&objective) > value {
+        if !is_below(trial, 1.0) {
             return Ok(f64::INFINITY);
         }
         let mut error = witnesses.measure(trial)?;
@@ -249,7 +251,7 @@ impl Witnesses<'_> {
         let deep = descent.points.deep;
         let peaks = search.of(&descent.mesh).map_err(refused)?;
         let pool: Vec<Vec3> = goal.pool.iter().map(|inside| inside.point).collect();
-        let enough = |i: usize| Some(held_from(goal.pool[i].depth, deep));
+        let enough = |i: usize| Some(held_from(goal.pool[i].depth.min(deep)));
         let nearest = union_of(&descent.mesh)?.deepest_batch_near(&pool, &[], enough);
         let signed: Vec<f64> = nearest.iter().map(|nearest| nearest.signed).collect();
         // The union's boundary at a distance `sigma` from a point that it does not hold is as deep as that
@@ -262,7 +264,7 @@ impl Witnesses<'_> {
             large.map(|peak| peak.point).collect()
         });
         let mut gaps: Vec<(f64, Vec3)> = (self.goal.pool.iter().zip(&signed))
-            .map(|(inside, &signed)| (uncovered(inside.depth, signed, deep), inside.point))
+            .map(|(inside, &signed)| (uncovered(inside.depth.min(deep), signed), inside.point))
             .filter(|&(gap, _)| gap > WITNESS * error)
             .collect();
         gaps.sort_by(|x, y| y.0.total_cmp(&x.0));
@@ -421,12 +423,15 @@ impl<'a> Descent<'a> {
         Ok(Self { goal, points, mesh, residuals, held, fixed, limits, guard, pattern, damping })
     }
 
-    /// Adds points, with their residuals.
+    /// Adds points, with their residuals, to the descent of a whole mesh.
     ///
     /// # Errors
     /// When the mesh has no union.
     pub fn join(&mut self, more: Points) -> Result<()> {
         let Self { goal, points, mesh, held, residuals: Residuals { rows, nearest }, .. } = self;
+        if more.samples.is_empty() && more.interior.is_empty() && more.outside.is_empty() {
+            return Ok(());
+        }
         let mut watched = nearest_balls(mesh, &more.outside)?;
         let mut found = residuals(mesh, goal, &more, &[], &[], 0.0, &mut watched)?;
         held.extend(watched);

@@ -256,6 +256,45 @@ fn a_ball_in_a_box_touches_its_nearest_sides() {
     assert!(ball.centre.distance(centre) < 2e-3 * half, "{ball:?}");
 }
 
+#[test]
+fn points_that_join_count_as_if_they_had_been_there() {
+    let shape = shape("torus", 24);
+    let goal = Goal::new(&shape, 0).unwrap();
+    let mut all = goal.points(30);
+    let mut fewer = all.clone();
+    fewer.samples.truncate(all.samples.len() / 2);
+    fewer.interior.truncate(all.interior.len() / 2);
+    all.outside.push(shape.mesh().vertices[0]);
+    let mesh = start(&shape, 30);
+    let at_once = Descent::new(&goal, all, mesh.clone()).unwrap();
+    let mut joined = Descent::new(&goal, fewer, mesh).unwrap();
+    let objective = Objective::power(4.0, 0.01);
+    assert!(joined.value(&objective) < 0.9 * at_once.value(&objective));
+    joined.join_new_of(&at_once.points).unwrap();
+    let [a, b] = [&joined, &at_once].map(|descent| descent.value(&objective));
+    assert!((a - b).abs() < 1e-12 * b, "{a}, {b}");
+    let served = |descent: &Descent<'_>| -> Vec<f64> {
+        let nearest = descent.residuals.nearest.iter().map(|nearest| nearest.signed);
+        // Of an interior point any primitive that holds it deeply enough is one.
+        nearest.take(descent.points.samples.len()).collect()
+    };
+    assert_eq!(joined.residuals.nearest.len(), at_once.residuals.nearest.len());
+    assert_eq!(served(&joined), served(&at_once));
+}
+
+#[test]
+fn sharp_edges_of_a_box_have_samples_and_a_smooth_torus_has_none() {
+    let shape_of_box = shape("box", 4);
+    let (lo, hi) = shape_of_box.mesh().bounding_box().unwrap();
+    let on_edge = |p: &Vec3| {
+        let sides = (0..3).filter(|&k| (p[k] - lo[k]).min(hi[k] - p[k]).abs() < 1e-12);
+        sides.count() >= 2
+    };
+    let found = Goal::new(&shape_of_box, 0).unwrap().along_sharp_edges(300.0);
+    assert!((270..=330).contains(&found.len()) && found.iter().all(on_edge), "{}", found.len());
+    assert!(Goal::new(&shape("torus", 48), 0).unwrap().along_sharp_edges(300.0).is_empty());
+}
+
 /// Two triangles in parallel planes, and a step that pushes a corner of one through the other.
 fn two_sheets() -> (MedialMesh, MedialMesh) {
     let at = |x: f64, y: f64, z: f64| Sphere::new(Vec3::new(x, y, z), 0.01);
