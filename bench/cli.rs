@@ -155,7 +155,7 @@ methods
   medial methods qmat
   medial methods --json
 simplify
-  medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma
+  medial simplify builtin:blob --spheres 100 -o blob.ma
   medial simplify builtin:blob --method qmat --max-error 0.01 -o blob.ma
   medial simplify builtin:blob --method angle --level 60 -o blob.glb
 axis

@@ -1,4 +1,4 @@
-//! `medial simplify MESH --method ID -o x.ma`: one method, one mesh.
+//! `medial simplify MESH [--method ID] -o x.ma`: one method, one mesh.
 
 use std::path::{Path, PathBuf};
 
@@ -27,7 +27,7 @@ use crate::measure::{fill_costs, fill_result};
 use crate::output::{counted, print_json, print_line, version};
 use crate::progress::StageLine;
 use crate::study::external::{AxisOptions, percent, read_axis};
-use crate::study::registry::{Entry, Registry};
+use crate::study::registry::{DEFAULT, Entry, Registry};
 use crate::study::source::Input;
 
 /// Arguments of `simplify`.
@@ -35,9 +35,10 @@ use crate::study::source::Input;
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
-    /// Run the method with this id; list the ids by `medial methods`.
+    /// Run the method with this id; list the ids by `medial methods`
+    /// [default with --spheres or --max-error: tight].
     #[arg(long, short, value_name = "ID")]
-    method: String,
+    method: Option<String>,
     /// Simplify to N spheres.
     #[arg(long, value_name = "N", conflicts_with_all = ["level", "max_error"])]
     spheres: Option<usize>,
@@ -71,7 +72,7 @@ pub struct Arguments {
 /// # Errors
 /// When the input is refused, the level is not met at all, or the output cannot be written.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
-    let entry = method(registry, &arguments.method)?;
+    let entry = arguments.entry(registry)?;
     let options = arguments.substrate.shape_options()?;
     // Errors that need no mesh are reported before it is read.
     arguments.outputs.check(entry.method())?;
@@ -79,7 +80,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     line.at("reading");
     let (input, mut shape) = shape_of(&arguments.mesh, options)?;
     if arguments.outputs.is_empty() && !global.json {
-        let example = format!("{}-{}.ma", file_stem(&input.name), arguments.method);
+        let example = format!("{}-{}.ma", file_stem(&input.name), entry.id());
         return Err(Failure::usage(format!(
             "no output: write the result with -o {example}, or print its figures with --json"
         )));
@@ -97,7 +98,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         seed: arguments.substrate.seed(),
         threads: Some(rayon::current_num_threads()),
         version: version().to_owned(),
-        ..Simplify::asked(&arguments.method, run.level, Status::Ok)
+        ..Simplify::asked(entry.id(), run.level, Status::Ok)
     };
     fill_costs(&mut simplify, &run.times);
     let simplified = run.outcome.map_err(|fault| arguments.failure(fault))?;
@@ -164,6 +165,17 @@ fn in_input_units(parts: &[PartInfo], shape: &Shape) -> serde_json::Result<serde
 }
 
 impl Arguments {
+    /// The named method, or the default where each method takes the level.
+    fn entry<'r>(&self, registry: &'r Registry) -> Result<&'r Entry, Failure> {
+        match (&self.method, self.spheres, self.max_error) {
+            (Some(id), ..) => method(registry, id),
+            (None, None, None) => Err(Failure::usage(format!(
+                "no method: name one with --method ID, or request --spheres N or --max-error E from the default, {DEFAULT}"
+            ))),
+            _ => method(registry, DEFAULT),
+        }
+    }
+
     /// Runs the method at the requested level, or at the one that a search finds.
     fn run(
         &self,
@@ -177,14 +189,14 @@ impl Arguments {
         let info = entry.method().info();
         let prepare = preparing(|view| entry.method().prepare(view, params, &context));
         let budget = Budget::from_now(None);
-        line.at(format!("preparing {}", self.method));
+        line.at(format!("preparing {}", info.id));
         let Some(bound) = self.max_error else {
             let level = match (self.spheres, self.level) {
                 (Some(count), _) => Level::Spheres(count),
                 (_, Some(value)) => Level::Native(value),
                 _ => Level::Published,
             };
-            let at = |level| line.at(format!("simplifying to {level} by {}", self.method));
+            let at = |level| line.at(format!("simplifying to {level} by {}", info.id));
             let view = shape.view();
             let run = answer(&view, info, || prepare(&view), &[level], &budget, at).pop();
             return Ok((run.expect("one level, one run"), None));
@@ -236,8 +248,9 @@ impl Arguments {
 fn print_result(simplify: &Simplify, search: Option<&Searched>, arguments: &Arguments) {
     let seconds = simplify.seconds.unwrap_or_default();
     print_line(&format!(
-        "{}: {}, {}, {}; substrates {:.2} s, prepare {:.2} s, simplify {:.2} s",
+        "{}{}: {}, {}, {}; substrates {:.2} s, prepare {:.2} s, simplify {:.2} s",
         simplify.method,
+        if arguments.method.is_none() { " (default)" } else { "" },
         counted(simplify.spheres.unwrap_or(0) as u64, "sphere"),
         counted(simplify.edges.unwrap_or(0) as u64, "edge"),
         counted(simplify.faces.unwrap_or(0) as u64, "face"),

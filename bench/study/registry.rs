@@ -13,6 +13,9 @@ use crate::provenance::hex_digest;
 /// Id of the pseudo-method that returns the initial medial mesh.
 pub const INITIAL: &str = "initial";
 
+/// Id of the method of `simplify` for a sphere count or an error bound.
+pub const DEFAULT: &str = "tight";
+
 /// Raised when a change of the runner changes records.
 const RUNNER: u32 = 1;
 

@@ -3,7 +3,7 @@
 use std::fs;
 use std::process::Command;
 
-use crate::command::{MEDIAL, done, ended, folder, json, refused};
+use crate::command::{MEDIAL, done, ended, folder, json, refused, words};
 
 /// Seconds and sizes that differ from run to run become `#`.
 fn without_timings(text: &str) -> String {
@@ -152,6 +152,10 @@ fn printed_results() {
     let axis = at("qmat.ma");
     let simplify = ["simplify", "builtin:capsule", "--method", "qmat", "--spheres", "20"];
     let simplified = done(&[&simplify[..], &["-o", &axis]].concat()).replace(&axis, "qmat.ma");
+    let default =
+        "simplify builtin:box:8 --spheres 20 --set rounds=1 --set start=100 --set samples=500 -o";
+    let default = done(&[&words(default)[..], &[&axis]].concat());
+    assert!(default.starts_with("tight (default): 20 spheres"), "{default}");
     insta::assert_snapshot!("simplify", without_timings(&simplified));
     insta::assert_snapshot!("axis", without_timings(&done(&["axis", "builtin:capsule"])));
 }

@@ -108,6 +108,8 @@ fn typing_errors_are_refused_with_a_suggestion() {
             "inf is not a distance",
         ),
         (&["simplify", sphere, "-m", "qmta"], "did you mean `qmat`?"),
+        (&["simplify", sphere, "--level", "60"], "no method: name one with --method ID"),
+        (&["simplify", sphere], "request --spheres N or --max-error E"),
         (&["methods", "dey-zhoa"], "did you mean `dey-zhao`?"),
         (&["info", "builtin:shpere"], "did you mean `sphere`?"),
         (&["datasets", "make", "shpere", "-o", "x.off"], "did you mean `sphere`?"),
