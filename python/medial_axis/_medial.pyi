@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 __version__: str
+DEFAULT_METHOD: str
 
 _Floats = npt.NDArray[np.float64]
 _Indices = npt.NDArray[np.uint32]

@@ -215,7 +215,7 @@ class MedialAxis:
     @typed
     def simplify(
         self,
-        method: str | type[Any],
+        method: str | type[Any] | None = None,
         *,
         spheres: int | None = None,
         level: float | Literal["published"] | None = None,
@@ -229,7 +229,7 @@ class MedialAxis:
         """The simplification by a method. Give one of `spheres`, `level` and `max_error`.
 
         Args:
-            method: An id of `medial_axis.methods()`, or a class of your own.
+            method: An id of `medial_axis.methods()`, or a class of your own; by default `tight` for `spheres` and `max_error`.
             spheres: Number of spheres.
             level: The native level, in the unit of the method; or `published`, the setting of its paper.
             max_error: Search the fewest spheres with at most this Hausdorff error, a fraction of the bounding-box diagonal.
@@ -256,8 +256,11 @@ class MedialAxis:
         """
         from .method import id_of, known_params
 
+        if method is None and not (spheres is max_error is None):
+            method = _medial.DEFAULT_METHOD
         if not isinstance(method, (str, type)):
-            raise ParameterError(f"method: expected an id or a class, found {method!r}")
+            without = "; only spheres=N and max_error=E have a default" if method is None else ""
+            raise ParameterError(f"method: expected an id or a class, found {method!r}{without}")
         given = {**(params or {}), **more}
         id, known = id_of(method), known_params(method)
         unknown = [] if known is None else [str(key) for key in given if key not in known]

@@ -34,6 +34,7 @@ use crate::method::Classes;
 #[pymodule]
 fn _medial(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("DEFAULT_METHOD", medial_bench::study::registry::DEFAULT)?;
     module.add_class::<surface::Surface>()?;
     module.add_class::<axis::Axis>()?;
     module.add_class::<method::ShapeHandle>()?;

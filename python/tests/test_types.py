@@ -18,6 +18,7 @@ import pytest
 
 import medial_axis
 from medial_axis import MedialAxis
+from medial_axis._medial import DEFAULT_METHOD
 
 GENERATED = Path(__file__).parent.parent / "medial_axis" / "_methods.py"
 
@@ -100,11 +101,12 @@ def generated() -> str:
                 continue
             kind = type_of(param)
             fields += f"    {param['name']}: {kind}" + ("\n" if kind.startswith("Lit") else f"  # {param['unit']}\n")
+        default = " | None = None" if id == DEFAULT_METHOD else ""
         head = f'\n\nclass {name}(Options, total=False):\n    """Options of `{id}`."""\n'
         parts.append(head + ("\n" + fields if fields else ""))
         overloads.append(
             "    @overload\n"
-            f'    def __call__(self, method: Literal["{id}"], **options: Unpack[{name}]) -> MedialAxis: ...\n'
+            f'    def __call__(self, method: Literal["{id}"]{default}, **options: Unpack[{name}]) -> MedialAxis: ...\n'
         )
     return "".join([*parts, *overloads, TAIL])
 
@@ -121,7 +123,7 @@ def calls(axis: MedialAxis, method: str, own: type) -> MedialAxis:
     axis = axis.simplify("qmat", spheres=100, k=1e-5, topology_from="never", seed=3)
     axis = axis.simplify("vmas", spheres=100, contact="mesh", params={"lambda": 0.3})
     axis = axis.simplify(method, level="published", params={"k": 0})
-    axis = axis.simplify(own, spheres=3, anything=4)
+    axis = axis.simplify(own, spheres=3, anything=4).simplify(spheres=2)
     axis.simplify("qmat", sheres=3)  # wrong
     axis.simplify("qmat", spheres=3, theta=60)  # wrong
     axis.simplify("qmat", spheres=3, k="small")  # wrong

@@ -97,6 +97,10 @@ def test_a_level_is_needed(axis: MedialAxis) -> None:
     with pytest.raises(ParameterError, match="one of"):
         axis.simplify("angle", spheres=9, level="published")
     assert axis.simplify("angle", level="published") == axis.simplify("angle", level=60)
+    with pytest.raises(ParameterError, match="only spheres=N and max_error=E have a default"):
+        axis.simplify(level=60)
+    default = axis.simplify(spheres=40, rounds=1, start=100).run
+    assert default is not None and default.method == "tight"
 
 
 def test_results_not_as_requested_give_warnings(axis: MedialAxis) -> None:
