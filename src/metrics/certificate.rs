@@ -140,7 +140,7 @@ pub fn certify(
 }
 
 /// Distances on one of the two surfaces to the other.
-trait Side: Sync {
+pub(super) trait Side: Sync {
     /// A part of this surface.
     type Piece: Copy + Send + Sync;
 
@@ -157,7 +157,7 @@ trait Side: Sync {
 
 /// Bounds of the largest distance in a piece.
 #[derive(Clone, Copy, Debug)]
-struct Bound {
+pub(super) struct Bound {
     /// The distance at `centre`; 0 if that point is not known to be on the surface.
     reached: f64,
     /// A point of the piece.
@@ -214,14 +214,14 @@ impl Search {
 }
 
 /// The primitives as whole convex bodies, unlike the parts in [`MedialUnion`].
-struct Hulls {
+pub(super) struct Hulls {
     spheres: Vec<Sphere>,
     cones: Vec<Cone>,
     slabs: Vec<Slab>,
 }
 
 impl Hulls {
-    fn new(mesh: &MedialMesh) -> Self {
+    pub fn new(mesh: &MedialMesh) -> Self {
         Self {
             spheres: mesh.spheres.clone(),
             cones: mesh
@@ -237,7 +237,7 @@ impl Hulls {
     }
 
     /// The largest signed distance to a primitive over the convex hull of some points.
-    fn largest_over(&self, primitive: Primitive, corners: &[Vec3]) -> f64 {
+    pub fn largest_over(&self, primitive: Primitive, corners: &[Vec3]) -> f64 {
         // A convex function is largest over a convex hull at one of its corners.
         corners.iter().fold(f64::NEG_INFINITY, |largest, &p| {
             largest.max(match primitive {
@@ -250,12 +250,15 @@ impl Hulls {
 }
 
 /// The distance from a point to the farthest of some others.
-fn farthest(from: Vec3, points: &[Vec3]) -> f64 {
+pub(super) fn farthest(from: Vec3, points: &[Vec3]) -> f64 {
     points.iter().fold(0.0, |far, &p| f64::max(far, from.distance_squared(p))).sqrt()
 }
 
 /// A triangle in four, by the midpoints of its sides.
-fn quartered([a, b, c]: [Vec3; 3], middle: impl Fn(Vec3, Vec3) -> Vec3) -> [[Vec3; 3]; 4] {
+pub(super) fn quartered(
+    [a, b, c]: [Vec3; 3],
+    middle: impl Fn(Vec3, Vec3) -> Vec3,
+) -> [[Vec3; 3]; 4] {
     let [d, e, f] = [middle(b, c), middle(c, a), middle(a, b)];
     [[a, f, e], [f, b, d], [e, d, c], [d, e, f]]
 }
@@ -340,24 +343,26 @@ impl Side for SurfaceSide<'_> {
 
 /// A point of a primitive's surface is on the boundary of the union, up to rounding, if it is no
 /// deeper than this in any primitive.
-const EXPOSED: f64 = 1e-12;
+pub(super) const EXPOSED: f64 = 1e-12;
 
 /// Initial parts of a cone's lateral around its axis.
-const SECTORS: u32 = 6;
+pub(super) const SECTORS: u32 = 6;
 
 /// The surfaces of all primitives against a surface.
-struct UnionSide<'a> {
-    bvh: &'a TriangleBvh,
-    triangles: Vec<PlanarFrame>,
-    mesh: &'a MedialMesh,
-    frames: Vec<Option<ConeFrame>>,
+pub(super) struct UnionSide<'a> {
+    pub bvh: &'a TriangleBvh,
+    pub triangles: Vec<PlanarFrame>,
+    pub mesh: &'a MedialMesh,
+    pub frames: Vec<Option<ConeFrame>>,
+    /// The axes of the octants that spheres are divided into.
+    pub axes: [Vec3; 3],
     union: &'a MedialUnion,
     hulls: &'a Hulls,
 }
 
 /// A part of the surface of one primitive.
 #[derive(Clone, Copy, Debug)]
-enum Piece {
+pub(super) enum Piece {
     /// A part of a tangent triangle of a slab.
     Flat([Vec3; 3]),
     /// A spherical triangle: a sphere, and unit vectors towards its corners.
@@ -368,8 +373,8 @@ enum Piece {
 }
 
 /// A point of a piece, and the corners of a convex polytope around the piece.
-struct Enclosure {
-    centre: Vec3,
+pub(super) struct Enclosure {
+    pub centre: Vec3,
     corners: [Vec3; 6],
     count: usize,
 }
@@ -388,6 +393,7 @@ impl<'a> UnionSide<'a> {
             triangles: faces.map(|f| PlanarFrame::new(surface.triangle(f)).0).collect(),
             mesh,
             frames: hulls.cones.iter().map(Cone::frame).collect(),
+            axes: Vec3::AXES,
             union,
             hulls,
         }
@@ -395,11 +401,12 @@ impl<'a> UnionSide<'a> {
 
     pub fn pieces(&self) -> Vec<Piece> {
         let mut pieces = Vec::new();
+        let [e, f, g] = self.axes;
         for v in 0..self.mesh.spheres.len() as u32 {
             for signs in 0..8 {
                 // Bit `k` of `signs` chooses the half space along axis `k`: one octant each.
                 let [x, y, z] = [0, 1, 2].map(|k| if signs >> k & 1 == 0 { 1.0 } else { -1.0 });
-                pieces.push(Piece::Round(v, [x * Vec3::X, y * Vec3::Y, z * Vec3::Z]));
+                pieces.push(Piece::Round(v, [x * e, y * f, z * g]));
             }
         }
         for (edge, frame) in (0..).zip(&self.frames) {
@@ -420,7 +427,7 @@ impl<'a> UnionSide<'a> {
         pieces
     }
 
-    fn sphere(&self, v: u32) -> Sphere {
+    pub fn sphere(&self, v: u32) -> Sphere {
         self.mesh.spheres[v as usize]
     }
 
@@ -430,54 +437,72 @@ impl<'a> UnionSide<'a> {
         (a.lerp(b, share), self.frames[edge as usize].expect("laterals have a frame"))
     }
 
-    fn enclose(&self, piece: &Piece) -> Enclosure {
+    /// The corners of a convex polytope around the normals of a curved piece, none of a flat one.
+    pub fn normals(&self, piece: &Piece) -> ([Vec3; 6], usize) {
+        let mut normals = [Vec3::ZERO; 6];
         match *piece {
-            Piece::Flat([a, b, c]) => Enclosure::new((a + b + c) / 3.0, &[a, b, c]),
-            Piece::Round(v, [a, b, c]) => {
+            Piece::Flat(_) => (normals, 0),
+            Piece::Round(_, [a, b, c]) => {
                 // Between the plane of its corners and the parallel tangent plane the piece is
                 // within the cone over its corners.
-                let Sphere { centre, radius } = self.sphere(v);
                 let normal = (b - a).cross(c - a).normalize_or_zero();
                 let height = normal.dot(a).abs();
-                let at = |direction: Vec3| centre + radius * direction;
-                let beyond = [a, b, c].map(|corner| at(corner / height));
-                let middle = at((a + b + c).normalize());
-                Enclosure::new(middle, &[at(a), at(b), at(c), beyond[0], beyond[1], beyond[2]])
+                ([a, b, c, a / height, b / height, c / height], 6)
             }
-            Piece::Lateral(edge, shares, [from, to]) => {
+            Piece::Lateral(edge, [t0, _], [from, to]) => {
                 // Around the axis, between the chord and the tangents at its ends.
                 let bulge = 1.0 / (0.5 * (to - from)).cos();
-                let middle = 0.5 * (from + to);
-                let mut corners = [Vec3::ZERO; 6];
-                for (k, share) in shares.into_iter().enumerate() {
-                    let (sphere, frame) = self.interpolated(edge, share);
-                    let rings = [(from, 1.0), (middle, bulge), (to, 1.0)];
-                    for (corner, (angle, lift)) in corners[3 * k..].iter_mut().zip(rings) {
-                        *corner = lateral_point(sphere, &frame, angle, lift);
-                    }
+                let (_, frame) = self.interpolated(edge, t0);
+                let rings = [(from, 1.0), (0.5 * (from + to), bulge), (to, 1.0)];
+                for (normal, (angle, lift)) in normals.iter_mut().zip(rings) {
+                    *normal = lateral_normal(&frame, angle, lift);
                 }
-                let (sphere, frame) = self.interpolated(edge, 0.5 * (shares[0] + shares[1]));
-                Enclosure::new(lateral_point(sphere, &frame, middle, 1.0), &corners)
+                (normals, 3)
+            }
+        }
+    }
+
+    pub fn enclose(&self, piece: &Piece) -> Enclosure {
+        let (normals, count) = self.normals(piece);
+        let normals = &normals[..count];
+        match *piece {
+            Piece::Flat([a, b, c]) => Enclosure::new((a + b + c) / 3.0, [a, b, c]),
+            Piece::Round(v, [a, b, c]) => {
+                let Sphere { centre, radius } = self.sphere(v);
+                let at = |direction: Vec3| centre + radius * direction;
+                Enclosure::new(at((a + b + c).normalize()), normals.iter().map(|&n| at(n)))
+            }
+            Piece::Lateral(edge, [t0, t1], [from, to]) => {
+                let ends = [t0, t1].map(|share| self.interpolated(edge, share).0);
+                let corners = ends
+                    .into_iter()
+                    .flat_map(|end| normals.iter().map(move |&n| end.centre + end.radius * n));
+                let (middle, frame) = self.interpolated(edge, 0.5 * (t0 + t1));
+                let normal = lateral_normal(&frame, 0.5 * (from + to), 1.0);
+                Enclosure::new(middle.centre + middle.radius * normal, corners)
             }
         }
     }
 }
 
-/// The point of a cone's sphere in the direction of the lateral's normal, with the component of the
-/// normal across the axis multiplied by `lift`.
-fn lateral_point(sphere: Sphere, frame: &ConeFrame, angle: f64, lift: f64) -> Vec3 {
+/// The normal of a cone's lateral at an angle, with its component across the axis multiplied by
+/// `lift`.
+pub(super) fn lateral_normal(frame: &ConeFrame, angle: f64, lift: f64) -> Vec3 {
     let (sin, cos) = angle.sin_cos();
-    sphere.centre + sphere.radius * frame.normal(lift * (cos * frame.v + sin * frame.w))
+    frame.normal(lift * (cos * frame.v + sin * frame.w))
 }
 
 impl Enclosure {
-    fn new(centre: Vec3, points: &[Vec3]) -> Self {
-        let mut corners = [Vec3::ZERO; 6];
-        corners[..points.len()].copy_from_slice(points);
-        Self { centre, corners, count: points.len() }
+    fn new(centre: Vec3, points: impl IntoIterator<Item = Vec3>) -> Self {
+        let mut enclosure = Self { centre, corners: [Vec3::ZERO; 6], count: 0 };
+        for point in points {
+            enclosure.corners[enclosure.count] = point;
+            enclosure.count += 1;
+        }
+        enclosure
     }
 
-    fn corners(&self) -> &[Vec3] {
+    pub fn corners(&self) -> &[Vec3] {
         &self.corners[..self.count]
     }
 }

@@ -296,7 +296,7 @@ impl Surface {
 
 /// The unit vector orthogonal to a cone's axis in the direction of the first of `axes` that is not
 /// nearly parallel to the cone's axis.
-fn across(frame: &ConeFrame, axes: [Vec3; 3]) -> Vec3 {
+pub(super) fn across(frame: &ConeFrame, axes: [Vec3; 3]) -> Vec3 {
     let [x, y, _] = axes;
     // Below one half, so that one of two orthogonal axes always qualifies; not a simple fraction, so
     // that rounding does not decide for symmetric shapes.

@@ -7,15 +7,17 @@
 //! 3. The boundary of U is sampled uniformly by area ([`super::envelope`]) and measured against S.
 //! 4. From the largest samples of each distance, local ascent looks for the maximum
 //!    ([`super::ascent`]).
+//! 5. Both surfaces are swept for places where `|sigma|` or the distance to S exceeds the larger maximum
+//!    ([`super::sweep`]).
 //!
 //! Means, root mean squares and percentiles are over the area-uniform samples; maxima are over all
-//! samples and the points that the ascent reached.
+//! samples and the points that the ascent and the sweep reached.
 //!
 //! # Biases
 //! - A reported maximum is the distance at an actual point, so a lower bound of the true one. Since
 //!   distances are 1-Lipschitz, it falls short by at most the largest distance from a point of the
-//!   surface to the nearest sample, and only if no ascent reached the true place. The ascent is local:
-//!   only [`certify`](super::certify) proves a maximum.
+//!   surface to the nearest sample, and only if neither an ascent nor the sweep reached the true place. Only
+//!   [`certify`](super::certify) proves a maximum.
 //! - Where S runs inside U, `|sigma|` is a lower bound of the distance to the boundary of U:
 //!   `epsilon_union` is the distance between the surfaces only where S runs outside U. The reverse
 //!   distance, which is exact, covers the other case.
@@ -25,8 +27,10 @@
 
 use super::Distances;
 use super::ascent::{OnMesh, OnUnion, Peak, Start, ascend};
+use super::certificate::Hulls;
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::samples::{SEEDS, SurfaceSamples};
+use super::sweep::{SweptSurface, SweptUnion, peaks_above};
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, UnionError};
 use crate::geometry::TriangulationError;
@@ -114,7 +118,7 @@ pub fn distances(
 ) -> Result<Distances, MetricError> {
     let samples = SurfaceSamples::new(surface, options.surface_samples, options.seed)?;
     let (mesh, union) = samples.ordered(mesh)?;
-    let (distances, _) = distances_with_envelope(bvh, &mesh, &union, &samples, options)?;
+    let (distances, _) = distances_with_envelope((surface, bvh), &mesh, &union, &samples, options)?;
     Ok(distances)
 }
 
@@ -127,7 +131,7 @@ pub(super) struct Envelope {
 /// As [`distances`], with the samples of the reverse distance; `union` is that of `mesh`, whose spheres
 /// are in the order of the samples' pose.
 pub(super) fn distances_with_envelope(
-    bvh: &TriangleBvh,
+    (surface, bvh): (&TriMesh, &TriangleBvh),
     mesh: &MedialMesh,
     union: &MedialUnion,
     samples: &SurfaceSamples,
@@ -140,7 +144,8 @@ pub(super) fn distances_with_envelope(
     let balls = MedialUnion::of_spheres(&mesh.spheres)?;
     let spheres = absolute(balls.signed_batch(&samples.points));
     let start = samples.start(&sigma);
-    let epsilon_union = highest(bvh, &start, |p, near| union.signed_from(p, near).abs());
+    let sigma_at = |p, near: &mut usize| union.signed_from(p, near).abs();
+    let epsilon_union = highest(bvh, &start, sigma_at);
     let by_mu = Start { values: &mu, ..start };
     let epsilon = highest(bvh, &by_mu, |p, near| union.unsigned_from(p, near));
     // |sigma| >= mu at every point, so the maximum found for mu bounds it, too.
@@ -162,6 +167,16 @@ pub(super) fn distances_with_envelope(
     let (points, values) = (envelope.points.as_slice(), envelope.distances.as_slice());
     let peaks = ascend(&hill, &Start { points, values, ..start });
     envelope.extend(peaks);
+    let reverse = largest(&envelope.distances);
+    let hulls = Hulls::new(mesh);
+    let side = SweptSurface { union, hulls: &hulls };
+    let triangles = (0..surface.faces.len()).map(|face| surface.triangle(face)).collect();
+    let on_mesh = OnMesh { mesh: bvh, value: sigma_at };
+    let peaks = peaks_above(&side, triangles, (&on_mesh, &start), epsilon_union.max(reverse));
+    let epsilon_union = peaks.iter().fold(epsilon_union, |most, peak| most.max(peak.distance));
+    let side = SweptUnion::new(pose, (surface, bvh), mesh, (union, &hulls));
+    let known = epsilon_union.max(reverse);
+    envelope.extend(peaks_above(&side, side.pieces(), (&hill, &start), known));
     let reverse = largest(&envelope.distances);
     let uniform = Summary::new(&sigma[..samples.uniform]);
     let distances = Distances {

@@ -101,7 +101,15 @@ impl Judge {
         let ((distances, volume_error), (axis, (quality, spikes, betti))) = rayon::join(
             || {
                 rayon::join(
-                    || distances_with_envelope(&self.tree, mesh, union, samples, &options),
+                    || {
+                        distances_with_envelope(
+                            (&self.surface, &self.tree),
+                            mesh,
+                            union,
+                            samples,
+                            &options,
+                        )
+                    },
                     || self.volume_error(mesh, union, &samples.pose),
                 )
             },
@@ -153,7 +161,8 @@ impl Judge {
         let samples = self.samples()?;
         let (mesh, union) = samples.ordered(mesh)?;
         let options = self.distance_options();
-        Ok(distances_with_envelope(&self.tree, &mesh, &union, samples, &options)?.0)
+        let surface = (&self.surface, &*self.tree);
+        Ok(distances_with_envelope(surface, &mesh, &union, samples, &options)?.0)
     }
 
     fn samples(&self) -> Result<&SurfaceSamples, MetricError> {
@@ -323,8 +332,9 @@ pub struct Evaluation {
 
 /// Distances between the surface S and the boundary of the union U of the medial primitives.
 ///
-/// Maxima are over samples and the points that are reached from the largest of them by local ascent:
-/// distances at actual points, and so lower bounds of the true maxima.
+/// Maxima are over samples, the points that are reached from the largest of them by local ascent, and those
+/// where a sweep of both surfaces finds a larger `hausdorff`: distances at actual points, and so lower bounds
+/// of the true maxima.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Distances {
     /// Largest distance from a point of S to the nearest primitive's surface, buried or not:

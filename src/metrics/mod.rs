@@ -10,6 +10,7 @@ mod hausdorff;
 mod judge;
 mod samples;
 mod spikes;
+mod sweep;
 mod union_topology;
 mod volume;
 

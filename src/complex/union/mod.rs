@@ -191,6 +191,18 @@ impl MedialUnion {
         nearest.signed
     }
 
+    /// The primitive of least signed distance, searched as in [`signed_from`](Self::signed_from), and the
+    /// centre of its interpolated sphere that attains the distance.
+    pub(crate) fn deepest_from(
+        &self,
+        p: Vec3,
+        near: &mut usize,
+    ) -> (NearestPrimitive, Option<Vec3>) {
+        let (nearest, place) = self.parts.nearest::<Signed>(p, *near);
+        *near = place;
+        (nearest, self.parts.shape(place).nearest_centre(p).map(|(_, centre)| centre))
+    }
+
     /// A point of the union's boundary near to `p`, searched as in [`signed_from`](Self::signed_from).
     /// If `p` is outside, the closest point. From inside, the point leaves the deepest primitive, again
     /// and again; `None` if it ends more than `burial` inside some primitive.

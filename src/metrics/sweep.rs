@@ -1,0 +1,310 @@
+//! A sweep of both surfaces for places farther from the other one than those known so far.
+//!
+//! Ascent ([`super::ascent`]) begins at samples. Where a union follows a surface closely, its peaks are
+//! narrower than the samples' spacing, and as high as each other: no ascent begins at most of them. The
+//! sweep divides both surfaces like the certificate ([`super::certificate`]) until no piece seems to
+//! exceed the largest distance by more than [`SHARE`]. It is faster, and proves nothing:
+//!
+//! 1. The change of a distance within a piece is estimated by its gradient at the centre.
+//! 2. A piece whose centre is buried by more than [`BURIED`] of its extent counts as buried.
+//! 3. A piece inherits the closest face and the deepest primitive of the piece that it is a part of.
+//!    Mostly one of these shows that the piece is irrelevant.
+//! 4. A point of a primitive's surface with the normal `n` is inside the primitive of a neighbouring
+//!    sphere that reaches farther in the direction `n`.
+//! 5. The number of pieces is limited. Those with the largest bounds come first.
+
+use std::f64::consts::TAU;
+
+use rayon::prelude::*;
+
+use super::ascent::{Hill, Peak, Start, ascend};
+use super::certificate::{
+    EXPOSED, Hulls, Piece, SECTORS, Side, UnionSide, farthest, lateral_normal, quartered,
+};
+use super::envelope::across;
+use super::samples::Pose;
+use crate::Vec3;
+use crate::complex::{Incidence, MedialMesh, MedialUnion, Primitive};
+use crate::surface::{TriMesh, TriangleBvh};
+
+/// Pieces that exceed the largest known distance by a smaller share are not divided.
+const SHARE: f64 = 0.005;
+
+/// Nor are those that exceed it by less than this share of the diameter.
+const FLOOR: f64 = 1e-6;
+
+/// Depth of a buried piece, as a share of its extent.
+const BURIED: f64 = 0.5;
+
+/// Pieces whose extent is a larger multiple of the largest distance are rarely bounded by it.
+const COARSE: f64 = 4.0;
+
+/// Pieces that one thread bounds one after the other, each search starting from the last result.
+const RUN: usize = 256;
+
+/// Pieces for each sample, and for any number of samples.
+const PIECES: usize = 16;
+const MOST_PIECES: usize = 1 << 18;
+
+/// Peaks that are sought uphill from the largest distances of the sweep, and the first step, as a share of
+/// the largest distance.
+const SEEDS: usize = 6;
+const NARROW: f64 = 0.25;
+
+/// A surface to be swept.
+pub(super) trait Swept: Sync {
+    /// A part of the surface.
+    type Piece: Clone + Send + Sync;
+
+    /// Bounds a piece: `None` if it does not exceed `enough`.
+    fn bound(&self, piece: &mut Self::Piece, enough: f64, near: &mut usize) -> Option<Bound>;
+
+    /// Appends pieces that together cover a piece.
+    fn divide(&self, piece: &Self::Piece, parts: &mut Vec<Self::Piece>);
+}
+
+/// A piece that may exceed the largest distance.
+#[derive(Clone, Copy)]
+pub(super) struct Bound {
+    centre: Vec3,
+    /// The distance at the centre, 0 if that is not on the surface.
+    reached: f64,
+    upper: f64,
+}
+
+/// The peaks of one surface that are farther from the other one than `known`, at most [`SEEDS`]. Samples
+/// gave `start`, which also limits the number of pieces. The result is the same for any number of
+/// threads.
+pub(super) fn peaks_above<S: Swept>(
+    side: &S,
+    mut pieces: Vec<S::Piece>,
+    (hill, start): (&impl Hill, &Start<'_>),
+    known: f64,
+) -> Vec<Peak> {
+    let mut left = (PIECES * start.points.len()).min(MOST_PIECES);
+    let floor = FLOOR * start.pose.diameter();
+    let enough = |largest: f64| largest + f64::max(SHARE * largest, floor);
+    let (mut largest, mut points, mut values) = (known, Vec::new(), Vec::new());
+    while !pieces.is_empty() {
+        left = left.saturating_sub(pieces.len());
+        let limit = enough(largest);
+        let bounds = pieces.par_chunks_mut(RUN).flat_map_iter(|run| {
+            let mut near = 0;
+            let bounds = run.iter_mut().map(|piece| side.bound(piece, limit, &mut near));
+            bounds.collect::<Vec<_>>()
+        });
+        let bounds: Vec<Option<Bound>> = bounds.collect();
+        for bound in bounds.iter().flatten().filter(|bound| bound.reached > known) {
+            points.push(bound.centre);
+            values.push(bound.reached);
+            largest = largest.max(bound.reached);
+        }
+        let uppers = bounds.iter().map(|bound| bound.map_or(0.0, |bound| bound.upper));
+        let mut open: Vec<(f64, &S::Piece)> = uppers.zip(&pieces).collect();
+        open.retain(|&(upper, _)| upper > enough(largest));
+        if open.len() > left / 4 {
+            open.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+            open.truncate(left / 4);
+        }
+        let mut parts = Vec::with_capacity(4 * open.len());
+        open.iter().for_each(|(_, piece)| side.divide(piece, &mut parts));
+        pieces = parts;
+    }
+    let (points, values) = (&points[..], &values[..]);
+    ascend(hill, &Start { points, values, spacing: NARROW * largest, seeds: SEEDS, ..*start })
+}
+
+/// The largest rise of a linear function from a point to some others.
+fn rise(gradient: Vec3, from: Vec3, corners: &[Vec3]) -> f64 {
+    corners.iter().fold(0.0, |rise, &corner| f64::max(rise, gradient.dot(corner - from)))
+}
+
+/// The triangles of a surface, with `|sigma|`.
+pub(super) struct SweptSurface<'a> {
+    pub union: &'a MedialUnion,
+    pub hulls: &'a Hulls,
+}
+
+impl Swept for SweptSurface<'_> {
+    type Piece = [Vec3; 3];
+
+    fn bound(&self, corners: &mut [Vec3; 3], enough: f64, near: &mut usize) -> Option<Bound> {
+        let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let (deepest, attained_at) = self.union.deepest_from(centre, near);
+        let reached = deepest.signed.abs();
+        if reached + farthest(centre, corners) <= enough {
+            return None;
+        }
+        let above = self.hulls.largest_over(deepest.primitive, corners);
+        let inward = attained_at.and_then(|c| (c - centre).try_normalize()).unwrap_or_default();
+        let upper = above.max(rise(inward, centre, corners) - deepest.signed);
+        (upper > enough).then_some(Bound { centre, reached, upper })
+    }
+
+    fn divide(&self, piece: &[Vec3; 3], parts: &mut Vec<[Vec3; 3]>) {
+        parts.extend(quartered(*piece, Vec3::midpoint));
+    }
+}
+
+/// The surfaces of all primitives, with distances from a surface.
+pub(super) struct SweptUnion<'a> {
+    side: UnionSide<'a>,
+    union: &'a MedialUnion,
+    hulls: &'a Hulls,
+    /// The ends of the edges at each sphere.
+    neighbours: Vec<Vec<u32>>,
+    /// The third corners of the faces at each edge.
+    opposite: Vec<Vec<u32>>,
+}
+
+/// A piece, the face that is closest to it and the primitive that is deepest there.
+type Hinted = (Piece, Option<(u32, Primitive)>);
+
+impl<'a> SweptUnion<'a> {
+    pub fn new(
+        pose: &Pose,
+        (surface, bvh): (&TriMesh, &'a TriangleBvh),
+        mesh: &'a MedialMesh,
+        (union, hulls): (&'a MedialUnion, &'a Hulls),
+    ) -> Self {
+        let mut side = UnionSide::new(surface, bvh, mesh, union, hulls);
+        side.axes = pose.axes();
+        for frame in side.frames.iter_mut().flatten() {
+            frame.v = across(frame, side.axes);
+            frame.w = frame.u.cross(frame.v);
+        }
+        let mut neighbours = vec![Vec::new(); mesh.spheres.len()];
+        for &[a, b] in &mesh.edges {
+            neighbours[a as usize].push(b);
+            neighbours[b as usize].push(a);
+        }
+        let mut opposite = vec![Vec::new(); mesh.edges.len()];
+        let incidence = Incidence::of(mesh);
+        for (&[a, b, c], sides) in mesh.faces.iter().zip(incidence.face_edges()) {
+            for (edge, corner) in sides.iter().zip([c, b, a]) {
+                opposite[*edge as usize].push(corner);
+            }
+        }
+        Self { side, union, hulls, neighbours, opposite }
+    }
+
+    /// The initial pieces. Laterals are cut where a face begins or ends to overtop them.
+    pub fn pieces(&self) -> Vec<Hinted> {
+        let mut pieces = self.side.pieces();
+        pieces.retain(|piece| !matches!(piece, Piece::Lateral(..)));
+        for (edge, frame) in (0..).zip(&self.side.frames) {
+            let Some(frame) = frame else { continue };
+            let sectors = (0..=SECTORS).map(|k| TAU * f64::from(k) / f64::from(SECTORS));
+            let mut cuts: Vec<f64> = sectors.collect();
+            let normal = |angle| lateral_normal(frame, angle, 1.0);
+            for other in self.others(&Piece::Lateral(edge, [0.0, 1.0], [0.0, TAU])) {
+                // The height of the other sphere in the direction of the normal at an angle is a constant
+                // and a cosine.
+                let [start, quarter, half] =
+                    [0.0, 0.25, 0.5].map(|t| other.height(normal(t * TAU)));
+                let mean = 0.5 * (start + half);
+                let (cos, sin) = (start - mean, quarter - mean);
+                let swing = (-mean / cos.hypot(sin)).acos();
+                let cuts_of = [-swing, swing].map(|by| (sin.atan2(cos) + by).rem_euclid(TAU));
+                // Not a number if the height has the same sign all around.
+                cuts.extend(cuts_of.into_iter().filter(|cut| cut.is_finite()));
+            }
+            cuts.sort_by(f64::total_cmp);
+            for sector in cuts.windows(2) {
+                let piece = Piece::Lateral(edge, [0.0, 1.0], [sector[0], sector[1]]);
+                if !self.is_overtopped(&piece, &[normal(0.5 * (sector[0] + sector[1]))]) {
+                    pieces.push(piece);
+                }
+            }
+        }
+        pieces.into_iter().map(|piece| (piece, None)).collect()
+    }
+
+    /// The spheres that can reach farther than a curved piece.
+    fn others(&self, piece: &Piece) -> impl Iterator<Item = Other> {
+        let (sphere, others): (_, &[u32]) = match *piece {
+            Piece::Flat(_) => (0, &[]),
+            Piece::Round(v, _) => (v, &self.neighbours[v as usize]),
+            Piece::Lateral(e, ..) => {
+                (self.side.mesh.edges[e as usize][0], &self.opposite[e as usize])
+            }
+        };
+        let own = self.side.sphere(sphere);
+        others.iter().map(move |&v| {
+            let other = self.side.sphere(v);
+            Other { way: other.centre - own.centre, growth: other.radius - own.radius }
+        })
+    }
+
+    /// Whether another sphere reaches farther in the direction of each normal of a curved piece.
+    fn is_overtopped(&self, piece: &Piece, normals: &[Vec3]) -> bool {
+        self.others(piece).any(|other| normals.iter().all(|&n| other.height(n) > EXPOSED))
+    }
+}
+
+/// A sphere relative to another one.
+struct Other {
+    way: Vec3,
+    growth: f64,
+}
+
+impl Other {
+    /// How much farther it reaches in a direction; of a longer vector as well, for convex combinations.
+    fn height(&self, n: Vec3) -> f64 {
+        n.dot(self.way) + self.growth
+    }
+}
+
+impl Swept for SweptUnion<'_> {
+    type Piece = Hinted;
+
+    fn bound(&self, (piece, hint): &mut Hinted, enough: f64, near: &mut usize) -> Option<Bound> {
+        let (normals, count) = self.side.normals(piece);
+        if self.is_overtopped(piece, &normals[..count]) {
+            return None;
+        }
+        let enclosure = self.side.enclose(piece);
+        let (centre, corners) = (enclosure.centre, enclosure.corners());
+        let reach = farthest(centre, corners);
+        if let Piece::Round(_, [a, b, c]) = *piece
+            && reach > COARSE * enough
+            && self.is_overtopped(piece, &[(a + b + c).normalize()])
+        {
+            // Too large for a bound by its distance, and buried.
+            return Some(Bound { centre, reached: 0.0, upper: f64::INFINITY });
+        }
+        let is_buried_in = |primitive| self.hulls.largest_over(primitive, corners) < -EXPOSED;
+        // The distance to one triangle is convex, so its largest value is at a corner.
+        let from_face = |face: u32| {
+            let triangle = &self.side.triangles[face as usize];
+            corners.iter().map(|&c| triangle.distance_squared(c)).fold(0.0, f64::max).sqrt()
+        };
+        if let Some((face, primitive)) = *hint
+            && (is_buried_in(primitive) || from_face(face) <= enough)
+        {
+            return None;
+        }
+        let closest = self.side.bvh.closest_from(centre, hint.map(|(face, _)| face));
+        let distance = closest.distance;
+        let away = (centre - closest.point).try_normalize().unwrap_or_default();
+        let upper = (distance + reach).min(from_face(closest.face));
+        let upper = upper.min(distance + rise(away, centre, corners));
+        if upper <= enough {
+            return None;
+        }
+        let (deepest, _) = self.union.deepest_from(centre, near);
+        let signed = deepest.signed;
+        if signed < -EXPOSED && (signed < -BURIED * reach || is_buried_in(deepest.primitive)) {
+            return None;
+        }
+        *hint = Some((closest.face, deepest.primitive));
+        let reached = if signed >= -EXPOSED { distance } else { 0.0 };
+        Some(Bound { centre, reached, upper })
+    }
+
+    fn divide(&self, (piece, hint): &Hinted, parts: &mut Vec<Hinted>) {
+        let mut divided = Vec::with_capacity(4);
+        self.side.divide(piece, &mut divided);
+        parts.extend(divided.into_iter().map(|part| (part, *hint)));
+    }
+}
