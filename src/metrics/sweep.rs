@@ -6,12 +6,11 @@
 //! exceed the largest distance by more than [`SHARE`]. It is faster, and proves nothing:
 //!
 //! 1. The change of a distance within a piece is estimated by its gradient at the centre.
-//! 2. A piece whose centre is buried by more than [`BURIED`] of its extent counts as buried.
-//! 3. A piece inherits the closest face and the deepest primitive of the piece that it is a part of.
+//! 2. A piece inherits the closest face and the deepest primitive of the piece that it is a part of.
 //!    Mostly one of these shows that the piece is irrelevant.
-//! 4. A point of a primitive's surface with the normal `n` is inside the primitive of a neighbouring
+//! 3. A point of a primitive's surface with the normal `n` is inside the primitive of a neighbouring
 //!    sphere that reaches farther in the direction `n`.
-//! 5. The number of pieces is limited. Those with the largest bounds come first.
+//! 4. The number of pieces is limited. Those with the largest bounds come first.
 
 use std::f64::consts::TAU;
 
@@ -32,9 +31,6 @@ const SHARE: f64 = 0.005;
 
 /// Nor are those that exceed it by less than this share of the diameter.
 const FLOOR: f64 = 1e-6;
-
-/// Depth of a buried piece, as a share of its extent.
-const BURIED: f64 = 0.5;
 
 /// Pieces whose extent is a larger multiple of the largest distance are rarely bounded by it.
 const COARSE: f64 = 4.0;
@@ -294,7 +290,7 @@ impl Swept for SweptUnion<'_> {
         }
         let (deepest, _) = self.union.deepest_from(centre, near);
         let signed = deepest.signed;
-        if signed < -EXPOSED && (signed < -BURIED * reach || is_buried_in(deepest.primitive)) {
+        if signed < -EXPOSED && (signed + reach < -EXPOSED || is_buried_in(deepest.primitive)) {
             return None;
         }
         *hint = Some((closest.face, deepest.primitive));

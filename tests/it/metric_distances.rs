@@ -466,6 +466,29 @@ fn the_interval_agrees_with_samples_on_random_meshes() {
     }
 }
 
+/// A ball with hundreds of narrow bumps, one of which is higher than the others: few samples lie on it.
+#[test]
+fn the_highest_of_many_narrow_bumps_is_found() {
+    let surface = crate::shapes::sphere(4);
+    let bvh = TriangleBvh::new(&surface).unwrap();
+    let bump = |direction: Vec3, height: f64| ((0.98 + height) * direction, 0.02);
+    for seed in 0..4 {
+        let mut rng = Pcg64::seed_from_u64(seed);
+        let mut random = || Vec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
+        let mut balls = vec![(Vec3::ZERO, 1.0)];
+        balls.extend((0..300).map(|_| bump(random().normalize(), 0.01)));
+        // Over the foot of the centre in a face, which is acute.
+        let [a, b, c] = surface.triangle(400 * seed as usize);
+        let normal = (b - a).cross(c - a).normalize();
+        balls.push(bump(normal, 0.015));
+        let exact = 1.015 - normal.dot(a);
+        let options = DistanceOptions { surface_samples: 500, envelope_samples: 500, seed };
+        let sampled = distances(&surface, &bvh, &complex(&balls, &[], &[]), &options).unwrap();
+        let share = sampled.hausdorff / exact;
+        assert!((0.99..1.0 + 1e-9).contains(&share), "{share} of {exact}");
+    }
+}
+
 #[test]
 fn uncertifiable_tolerances_are_rejected() {
     let surface = centred_cuboid(Vec3::splat(0.3));
