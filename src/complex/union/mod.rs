@@ -305,6 +305,13 @@ impl MedialUnion {
         runs.collect()
     }
 
+    /// For many points, in their order, in parallel: the [`deepest`](Self::deepest) primitive, if its distance is
+    /// below the limit of the point. Fast where most are not.
+    pub fn below_batch(&self, points: &[Vec3], limits: &[f64]) -> Vec<Option<NearestPrimitive>> {
+        let pairs = points.par_iter().zip(limits).with_min_len(RUN);
+        pairs.map(|(&p, &limit)| self.parts.below(p, limit)).collect()
+    }
+
     /// For many points, in their order, in parallel: [`signed`](Self::signed), and the radius of the
     /// ball on the primitive that attains it.
     pub fn deepest_ball_batch(&self, points: &[Vec3]) -> Vec<(f64, f64)> {

@@ -46,6 +46,14 @@ impl Parts {
         search.answer()
     }
 
+    /// The primitive of least signed distance, if that is below a limit.
+    pub fn below(&self, p: Vec3, limit: f64) -> Option<NearestPrimitive> {
+        let mut search = Below { parts: self, p, limit, found: None };
+        self.search(&mut search);
+        let found = search.found?;
+        Some(NearestPrimitive { signed: search.limit, primitive: self.primitive(found) })
+    }
+
     /// Shows to a search all primitives within its limit, and some others.
     #[inline]
     pub fn search(&self, search: &mut impl UnionSearch) {
@@ -242,6 +250,37 @@ impl<R: Reading> UnionSearch for Nearest<'_, R> {
         {
             (self.place, self.signed, self.value) = (place, signed, value);
             self.tighten();
+        }
+    }
+}
+
+/// Search for the primitive of least signed distance below a limit.
+struct Below<'a> {
+    parts: &'a Parts,
+    p: Vec3,
+    /// The least distance so far.
+    limit: f64,
+    found: Option<usize>,
+}
+
+impl UnionSearch for Below<'_> {
+    const MEASURE: Measure = Measure::Signed;
+
+    #[inline]
+    fn point(&self) -> Vec3 {
+        self.p
+    }
+
+    #[inline]
+    fn limit(&self) -> f64 {
+        self.limit + self.limit.abs() * ROUNDING + self.parts.slack()
+    }
+
+    #[inline]
+    fn look(&mut self, place: usize) {
+        let signed = self.parts.shape(place).signed(self.p);
+        if signed < self.limit {
+            (self.limit, self.found) = (signed, Some(place));
         }
     }
 }

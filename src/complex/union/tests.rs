@@ -108,6 +108,8 @@ fn results_are_those_of_all_primitives() {
                 assert_eq!(union.unsigned_nearest(p).to_bits(), nearest.to_bits(), "{kind}, {p}");
                 let depth = least + vector(&mut rng).x * 1e-7;
                 assert_eq!(union.buries(p, -depth), least < depth, "{kind}, {count}, {p}");
+                let below = union.below_batch(&[p], &[depth])[0].map(|found| found.signed);
+                assert_eq!(below, (least < depth).then_some(least), "{kind}, {count}, {p}");
                 let mut near = 0;
                 union.each_nearer(p, 0.1, |_, _| near += 1);
                 assert_eq!(near, own().filter(|part| part.0 < 0.1).count(), "{kind}, {p}");
