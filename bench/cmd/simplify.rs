@@ -262,12 +262,12 @@ fn print_result(simplify: &Simplify, search: Option<&Searched>, arguments: &Argu
         print_line(&format!("  native level {}", significant(level, 4)));
     }
     if let Some(search) = search {
-        print_line(&format!(
-            "  Hausdorff error {}{}, the fewest spheres of {} tried",
-            if search.certified { "at most " } else { "" },
-            percent(search.hausdorff),
-            counted(search.tried as u64, "level")
-        ));
+        let of = match search.tried {
+            1 => String::new(),
+            tried => format!(", the fewest spheres of {tried} levels tried"),
+        };
+        let certified = if search.certified { "at most " } else { "" };
+        print_line(&format!("  Hausdorff error {certified}{}{of}", percent(search.hausdorff)));
     }
     arguments.outputs.written().iter().for_each(|line| print_line(&format!("  {line}")));
 }

@@ -15,7 +15,7 @@ use medial::simplifier::{Level, MethodInfo, Simplification, Simplified, Simplify
 use medial_reports::{Stages, Status, Target};
 use serde::{Deserialize, Serialize};
 
-use crate::measure::search::{Found, Measure, Search};
+use crate::measure::search::{Found, Measure, Probe, Search};
 
 /// The outcome of one level.
 pub struct LevelRun {
@@ -315,6 +315,15 @@ where
     begin
 }
 
+/// The run for a bound without a result.
+fn failed(bound: f64, fault: Fault) -> LevelRun {
+    LevelRun { level: Target::MaxError(bound), outcome: Err(fault), times: Times::default() }
+}
+
+fn missed(bound: f64, found: &Found) -> LevelRun {
+    failed(bound, Fault { status: Status::BoundMissed, reason: found.refusal(bound) })
+}
+
 /// A search for levels within error bounds.
 pub struct Bounds<'a> {
     /// The shape.
@@ -346,11 +355,9 @@ impl Bounds<'_> {
         bounds: &[f64],
         each: &mut dyn FnMut(LevelRun, Option<Found>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let failed = |bound: f64, fault: Fault| LevelRun {
-            level: Target::MaxError(bound),
-            outcome: Err(fault),
-            times: Times::default(),
-        };
+        if self.info.native.as_ref().is_some_and(|native| native.is_error_bound) {
+            return self.answer_directly(bounds, each);
+        }
         // A separate view: substrates of the search are not those of the timed run.
         let view = self.shape.view();
         let begun = guarded(|| Ok((view.initial()?.spheres.len(), (self.prepare)(&view)?)));
@@ -383,15 +390,44 @@ impl Bounds<'_> {
                 Ok(found) => {
                     let run = match found.within {
                         Some(probe) => self.timed(probe.level, bound),
-                        None => {
-                            let reason = found.refusal(bound);
-                            failed(bound, Fault { status: Status::BoundMissed, reason })
-                        }
+                        None => missed(bound, &found),
                     };
                     each(run, Some(found))?;
                 }
                 Err(fault) => each(failed(bound, fault), None)?,
             }
+        }
+        Ok(())
+    }
+
+    /// A run for each bound of a method that holds bounds by itself.
+    fn answer_directly<E>(
+        &self,
+        bounds: &[f64],
+        each: &mut dyn FnMut(LevelRun, Option<Found>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        for &bound in bounds {
+            (self.searching)(Target::MaxError(bound));
+            let run = match self.budget.used_up() {
+                Some(fault) => failed(bound, fault),
+                None => self.timed(Level::Native(bound), bound),
+            };
+            self.budget.has_level.set(true);
+            let Ok(Simplified { mesh, .. }) = &run.outcome else {
+                each(run, None)?;
+                continue;
+            };
+            let (run, found) = match (self.measure)(mesh) {
+                Ok(error) => {
+                    let spheres = mesh.spheres.len();
+                    let probe = Probe { level: Level::Native(bound), spheres, error };
+                    let within = (error <= bound).then_some(probe);
+                    let found = Found { within, best: Some(probe), tried: 1 };
+                    (if within.is_some() { run } else { missed(bound, &found) }, Some(found))
+                }
+                Err(why) => (failed(bound, Fault::from(SimplifyError::Level(why))), None),
+            };
+            each(run, found)?;
         }
         Ok(())
     }

@@ -17,7 +17,7 @@ use medial::geometry::{Cone, SlabFace};
 use medial::simplifier::RunContext;
 use rayon::prelude::*;
 
-use super::goal::{Goal, Points, uncovered, union_of, vertices};
+use super::goal::{Edited, Goal, Kept, Points, Residuals, uncovered, union_of, vertices};
 use super::rounds::{
     Block, Descent, LEAST_RADIUS, Objective, Rest, add_product, backward, cholesky, forward,
 };
@@ -40,7 +40,7 @@ const PULL: f64 = 1e-3;
 const ROUGH: usize = 8;
 
 /// Edges that are priced before the limit is updated, at least.
-const BLOCK: usize = 64;
+const BLOCK: usize = 16;
 
 /// Distance between points of a new star at which it is tested for protruding.
 const SPACING: f64 = 0.02;
@@ -70,25 +70,32 @@ impl Served {
     }
 }
 
-/// A mesh after a pass, and the merged spheres in it.
+/// A mesh after a pass.
 pub(super) struct Passed {
     pub mesh: MedialMesh,
-    pub merged: Vec<u32>,
+    /// For each sphere the one before; `None` for those that were merged.
+    pub of: Vec<Option<u32>>,
 }
 
 /// Collapses the cheapest edges that have no end in common, until `target` spheres are left; `None` if no
 /// collapse is possible.
 ///
 /// A `careful` pass looks at little more than the edges that it needs, and leaves the rest to the next one,
-/// which prices them again.
+/// which prices them again. Where each collapse would fold a face or make faces cross the cheapest of these are made.
 pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Option<Passed> {
+    let strict =
+        if descent.guard.is_tangled() { None } else { passed(descent, target, careful, true) };
+    strict.or_else(|| passed(descent, target, careful, false))
+}
+
+fn passed(descent: &Descent<'_>, target: usize, careful: bool, strict: bool) -> Option<Passed> {
     let mesh = &descent.mesh;
     let mut complex = CollapseComplex::from_mesh(mesh);
     let stars = Stars::new(descent);
     let needed = mesh.spheres.len() - target;
     let wanted = if careful { needed * 3 / 2 + 1 } else { mesh.edges.len() };
     let mut merged = vec![false; mesh.spheres.len()];
-    let mut sheets = Sheets::new(mesh);
+    let mut sheets = Sheets::new(mesh, strict);
     let priced = stars.cheapest(&complex, &sheets, descent.goal, wanted);
     let dearest = priced.last()?.price.max(0.0);
     for Priced { ends: [a, b], sphere, .. } in priced {
@@ -101,7 +108,7 @@ pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Optio
         if merged[a as usize]
             || merged[b as usize]
             || !complex.keeps_homotopy(a, b)
-            || complex.folded_face(a, b, sphere.centre).is_some()
+            || sheets.would_fold(&complex, [a, b], sphere)
             || sheets.would_cross(&complex, [a, b], sphere)
         {
             continue;
@@ -118,10 +125,9 @@ pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Optio
         complex.collapse(a, b, sphere);
     }
     // The mesh numbers the spheres that are left in their order.
-    let left = complex.vertices().enumerate().filter(|&(_, v)| merged[v as usize]);
-    let merged = left.map(|(place, _)| place as u32).collect();
-    (complex.sphere_count() < mesh.spheres.len())
-        .then(|| Passed { mesh: complex.to_mesh(), merged })
+    let of = complex.vertices().map(|v| (!merged[v as usize]).then_some(v));
+    let of: Vec<Option<u32>> = of.collect();
+    (complex.sphere_count() < mesh.spheres.len()).then(|| Passed { mesh: complex.to_mesh(), of })
 }
 
 /// The samples that each simplex serves, and each sphere's share of the squares.
@@ -266,7 +272,7 @@ impl<'a> Stars<'a> {
         let mut tried: Vec<(f64, Sphere)> = Vec::with_capacity(places.len());
         let mut worst = now + limit;
         for sphere in places {
-            if complex.folded_face(a, b, sphere.centre).is_some() {
+            if sheets.would_fold(complex, ends, sphere) {
                 continue;
             }
             let energy = ring.energy(sphere, &served, worst);
@@ -445,12 +451,17 @@ impl Ring {
 /// Times that the step of a sphere is halved before it is taken back altogether.
 const HALVINGS: usize = 4;
 
+/// A mesh with more than one pair of crossing faces for this number of faces is a tangle.
+const TANGLED: usize = 2;
+
 /// Faces that stay where they are, next to a mesh that moves. Vertices that are not of the mesh have larger
 /// numbers than those that are.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Still {
     pub faces: Vec<[u32; 3]>,
     pub corners: Vec<[Vec3; 3]>,
+    /// Whether the mesh around is a tangle.
+    pub is_tangled: bool,
 }
 
 /// Violations that a mesh must avoid while its spheres move.
@@ -458,6 +469,7 @@ pub(super) struct Guard {
     still: Crossings,
     /// Pairs that cross already.
     known: BTreeSet<Pair>,
+    is_tangled: bool,
 }
 
 /// A face of a mesh, and one that it crosses.
@@ -469,17 +481,32 @@ enum Pair {
 
 impl Guard {
     pub fn new(mesh: &MedialMesh, still: Still) -> Self {
-        let Still { faces, corners } = still;
+        let Still { faces, corners, is_tangled } = still;
         let tree = Crossings::new(faces.len(), |f| corners[f as usize]);
-        let mut this = Self { still: tree, known: BTreeSet::new() };
+        let mut this = Self { still: tree, known: BTreeSet::new(), is_tangled };
         this.known = this.crossing(mesh, |_| true).into_iter().collect();
+        let is_whole = faces.is_empty();
+        this.is_tangled |= is_whole && TANGLED * this.known.len() > mesh.faces.len();
         this
+    }
+
+    /// Whether so many faces cross that no more is refused: at the axis of a tube the start is a tangle of tiny faces.
+    pub fn is_tangled(&self) -> bool {
+        self.is_tangled
+    }
+
+    /// How many pairs of faces crossed at first.
+    pub fn crossings(&self) -> usize {
+        self.known.len()
     }
 
     /// Brings a step within its limits: centres outside are clamped, and the corners of faces that would fold
     /// over, or come to cross another one, go half the way, a quarter, or stay where they were.
     pub fn hold(&self, before: &MedialMesh, after: &mut MedialMesh, goal: &Goal) {
         clamp(after, goal);
+        if self.is_tangled {
+            return;
+        }
         // Taking one vertex back can fold another face of it. This ends: with all taken back the mesh is as before.
         let mut halvings = vec![0; before.spheres.len()];
         // The faces that are looked at: all, and then those of vertices taken back.
@@ -555,81 +582,78 @@ pub(super) fn clamp(mesh: &mut MedialMesh, goal: &Goal) {
 /// Samples that the rest of the mesh serves are looked at up to this distance from the moving part.
 const REACH: f64 = 0.02;
 
-/// The solid and the samples that a part of a mesh is moved against.
-pub(super) struct Patch<'a> {
-    pub goal: &'a Goal,
-    pub points: &'a Points,
+/// Moves the spheres of an edited mesh around `places`, at one power after the other, with `steps` steps each. `of` has
+/// for each sphere its number in the mesh `before`; it is `None` at the places.
+///
+/// # Errors
+/// When the run is cancelled.
+pub(super) fn settle(
+    before: &Descent<'_>,
+    mesh: &mut MedialMesh,
+    of: &[Option<u32>],
+    stages: &[(f64, usize)],
+    run: &RunContext,
+) -> Result<()> {
+    let moving = around(mesh, of);
+    let part = Part::of(mesh, &moving);
+    let kept = Edited { before: &before.mesh, mesh, of }.kept(&moving);
+    let (points, limits) = nearby(before, &kept, &union_of(&part.mesh)?, rest_of(mesh, &moving))?;
+    let share = part.mesh.spheres.len() as f64 / mesh.spheres.len() as f64;
+    let is_tangled = before.guard.is_tangled();
+    let still = Still { is_tangled, ..part.still(mesh, &moving) };
+    let Part { mesh: own, fixed, .. } = part;
+    let around = Rest { fixed, limits, still };
+    let mut descent = Descent::of_part(before.goal, points, own, around, share)?;
+    for &(power, steps) in stages {
+        descent.run(Objective::power(power, descent.largest()), steps, run)?;
+    }
+    for (&v, &sphere) in part.spheres.iter().zip(&descent.mesh.spheres) {
+        mesh.spheres[v as usize] = sphere;
+    }
+    Ok(())
 }
 
-impl Patch<'_> {
-    /// Moves the spheres around `places`, at one power after the other, with `steps` steps each.
-    ///
-    /// # Errors
-    /// When the run is cancelled.
-    pub fn settle(
-        &self,
-        mesh: &mut MedialMesh,
-        places: &[u32],
-        stages: &[(f64, usize)],
-        run: &RunContext,
-    ) -> Result<()> {
-        let moving = around(mesh, places);
-        let part = Part::of(mesh, &moving);
-        let rest = match rest_of(mesh, &moving) {
-            Some(rest) => Some(union_of(&rest)?),
-            None => None,
-        };
-        let (points, limits) = self.nearby(&union_of(&part.mesh)?, rest.as_ref());
-        let share = part.mesh.spheres.len() as f64 / mesh.spheres.len() as f64;
-        let still = part.still(mesh, &moving);
-        let Part { mesh: own, fixed, .. } = part;
-        let around = Rest { fixed, limits, still };
-        let mut descent = Descent::of_part(self.goal, points, own, around, share)?;
-        for &(power, steps) in stages {
-            descent.run(Objective::power(power, descent.largest()), steps, run)?;
+/// The samples that the moving part serves or may come to serve, and their distances to the rest. What served a sample
+/// `before` and was `kept` is the nearest primitive of the rest.
+fn nearby(
+    before: &Descent<'_>,
+    kept: &Kept,
+    part: &MedialUnion,
+    rest: Option<MedialMesh>,
+) -> Result<(Points, Vec<f64>)> {
+    let Descent { points: all, residuals: Residuals { nearest, .. }, .. } = before;
+    let (lo, hi) = part.bounding_box();
+    let is_near = |p: Vec3| (p - lo).min_element() > 0.0 && (hi - p).min_element() > 0.0;
+    let outside = all.outside.iter().copied().filter(|&p| is_near(p)).collect();
+    let mut points = Points { outside, deep: all.deep, ..Points::default() };
+    let places: Vec<Vec3> = all.places().collect();
+    let staying = nearest.iter().map(|found| kept.of(found.primitive).map(|_| found.signed));
+    let staying: Vec<Option<f64>> = staying.collect();
+    let within = staying.iter().map(|signed| signed.map_or(f64::NEG_INFINITY, |s| s + REACH));
+    let reached = part.below_batch(&places, &within.collect::<Vec<_>>());
+    let lost = places.iter().zip(&staying).filter(|(_, signed)| signed.is_none());
+    let lost: Vec<Vec3> = lost.map(|(&p, _)| p).collect();
+    let rest = rest.map(|rest| union_of(&rest)).transpose()?;
+    let of_rest = rest.map(|rest| rest.signed_batch(&lost)).unwrap_or_default();
+    let mut of_rest = of_rest.into_iter();
+    let mut limits = vec![];
+    for (i, signed) in staying.into_iter().enumerate() {
+        if signed.is_some() && reached[i].is_none() {
+            continue;
         }
-        for (&v, &sphere) in part.spheres.iter().zip(&descent.mesh.spheres) {
-            mesh.spheres[v as usize] = sphere;
+        match all.samples.get(i) {
+            Some(&sample) => points.samples.push(sample),
+            None => points.interior.push(all.interior[i - all.samples.len()]),
         }
-        Ok(())
+        limits.push(signed.or_else(|| of_rest.next()).unwrap_or(f64::INFINITY));
     }
-
-    /// The samples that the moving part serves or may come to serve, and their distances to the rest.
-    fn nearby(&self, part: &MedialUnion, rest: Option<&MedialUnion>) -> (Points, Vec<f64>) {
-        let (lo, hi) = part.bounding_box();
-        let samples = self.points.samples.iter().map(|sample| sample.point);
-        let places = samples.chain(self.points.interior.iter().map(|inside| inside.point));
-        let (kept, all): (Vec<usize>, Vec<medial::Vec3>) = places
-            .enumerate()
-            .filter(|&(_, p)| (p - lo).min_element() > -REACH && (hi - p).min_element() > -REACH)
-            .unzip();
-        let moving = part.signed_batch(&all);
-        let staying =
-            rest.map_or_else(|| vec![f64::INFINITY; all.len()], |rest| rest.signed_batch(&all));
-        let is_near = |p: Vec3| (p - lo).min_element() > 0.0 && (hi - p).min_element() > 0.0;
-        let outside = self.points.outside.iter().copied().filter(|&p| is_near(p)).collect();
-        let mut points = Points { outside, deep: self.points.deep, ..Points::default() };
-        let mut limits = vec![];
-        for ((i, moving), staying) in kept.into_iter().zip(moving).zip(staying) {
-            if moving > staying + REACH {
-                continue;
-            }
-            let samples = self.points.samples.len();
-            match self.points.samples.get(i) {
-                Some(&sample) => points.samples.push(sample),
-                None => points.interior.push(self.points.interior[i - samples]),
-            }
-            limits.push(staying);
-        }
-        (points, limits)
-    }
+    Ok((points, limits))
 }
 
-/// Which spheres are at a place or next to one. With their neighbours, too, the results were no better.
-fn around(mesh: &MedialMesh, places: &[u32]) -> Vec<bool> {
-    let mut reached = vec![false; mesh.spheres.len()];
-    places.iter().for_each(|&v| reached[v as usize] = true);
-    let own = reached.clone();
+/// Which spheres are new or next to a new one. With their neighbours, too, the results were no better.
+fn around(mesh: &MedialMesh, of: &[Option<u32>]) -> Vec<bool> {
+    let own: Vec<bool> = of.iter().map(Option::is_none).collect();
+    let mut reached = own.clone();
     for &[a, b] in &mesh.edges {
         reached[a as usize] |= own[b as usize];
         reached[b as usize] |= own[a as usize];
@@ -638,8 +662,8 @@ fn around(mesh: &MedialMesh, places: &[u32]) -> Vec<bool> {
 }
 
 /// The simplices with a moving corner, as a mesh of their own.
-struct Part {
-    mesh: MedialMesh,
+pub(super) struct Part {
+    pub mesh: MedialMesh,
     /// The places of its spheres in the whole mesh.
     spheres: Vec<u32>,
     /// Which of its spheres stay.
@@ -647,7 +671,7 @@ struct Part {
 }
 
 impl Part {
-    fn of(mesh: &MedialMesh, moving: &[bool]) -> Self {
+    pub fn of(mesh: &MedialMesh, moving: &[bool]) -> Self {
         let is_moving = |v: &u32| moving[*v as usize];
         let edges: Vec<_> = mesh.edges.iter().filter(|e| e.iter().any(is_moving)).collect();
         let faces: Vec<_> = mesh.faces.iter().filter(|f| f.iter().any(is_moving)).collect();
@@ -677,6 +701,22 @@ impl Part {
         Self { mesh, spheres, fixed }
     }
 
+    /// A primitive of the part, as one of the whole mesh.
+    pub fn in_whole(&self, whole: &MedialMesh, primitive: Primitive) -> Primitive {
+        let found = |place: Option<usize>| place.expect("the part is of the whole") as u32;
+        match primitive {
+            Primitive::Sphere(v) => Primitive::Sphere(self.spheres[v as usize]),
+            Primitive::Edge(e) => {
+                let edge = self.mesh.edges[e as usize].map(|v| self.spheres[v as usize]);
+                Primitive::Edge(found(whole.edges.binary_search(&edge).ok()))
+            }
+            Primitive::Face(f) => {
+                let face = self.mesh.faces[f as usize].map(|v| self.spheres[v as usize]);
+                Primitive::Face(found(whole.faces.binary_search(&face).ok()))
+            }
+        }
+    }
+
     /// The faces of the whole mesh without a moving corner, with its spheres numbered as in the part, and
     /// those that are not in it after them.
     fn still(&self, whole: &MedialMesh, moving: &[bool]) -> Still {
@@ -688,7 +728,7 @@ impl Part {
         let still = whole.faces.iter().filter(|face| !face.iter().any(|&v| moving[v as usize]));
         let (faces, corners) =
             still.map(|face| (face.map(|v| place[v as usize]), corners(whole, *face))).unzip();
-        Still { faces, corners }
+        Still { faces, corners, is_tangled: false }
     }
 }
 

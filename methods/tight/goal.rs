@@ -16,6 +16,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
+use super::collapse::Part;
 use crate::Result;
 
 /// Samples of the surface, below 500 spheres and from there on.
@@ -84,6 +85,20 @@ pub(super) struct Points {
     pub outside: Vec<Vec3>,
     /// Depth from which on an uncovered interior point counts alike.
     pub deep: f64,
+}
+
+impl Points {
+    /// The samples of the surface, and then the points inside.
+    pub fn places(&self) -> impl Iterator<Item = Vec3> {
+        let samples = self.samples.iter().map(|sample| sample.point);
+        samples.chain(self.interior.iter().map(|inside| inside.point))
+    }
+
+    /// The signed distance at which an interior point is held well enough, by its place among all.
+    pub fn enough(&self, i: usize) -> Option<f64> {
+        let i = i.checked_sub(self.samples.len())?;
+        Some(held_from(self.interior[i].depth.min(self.deep)))
+    }
 }
 
 /// Depth of a point in the solid, negative outside, and its gradient.
@@ -435,8 +450,8 @@ fn interpolated(mesh: &MedialMesh, held: &Held) -> Sphere {
 }
 
 /// About `count` points of the medial mesh, but all spheres: the rest spread evenly over edges and faces, so that not
-/// each small one has a point.
-fn spread_over(mesh: &MedialMesh, count: usize) -> Vec<Held> {
+/// each small one has a point. Those on simplices that are not `wanted` are left out.
+fn spread_over(mesh: &MedialMesh, count: usize, wanted: impl Fn(&[u32]) -> bool) -> Vec<Held> {
     let lengths = mesh.edges.iter().map(|edge| {
         let [a, b] = edge.map(|v| mesh.spheres[v as usize].centre);
         a.distance(b)
@@ -451,17 +466,18 @@ fn spread_over(mesh: &MedialMesh, count: usize) -> Vec<Held> {
     let root = (total_length * total_length + 4.0 * total_area * count).sqrt();
     let h = (total_length + root) / (2.0 * count);
     let mut all: Vec<Held> = (0..mesh.spheres.len() as u32)
+        .filter(|&v| wanted(&[v]))
         .map(|v| Held { primitive: Primitive::Sphere(v), weights: [1.0, 0.0, 0.0], known: None })
         .collect();
     let mut left = 0.5;
-    for (e, length) in (0..).zip(lengths) {
+    for (e, length) in (0..).zip(lengths).filter(|&(e, _)| wanted(&mesh.edges[e as usize])) {
         let n = whole_points(length / h, &mut left);
         all.extend((0..n).map(|k| {
             let t = (k as f64 + 0.5) / n as f64;
             Held { primitive: Primitive::Edge(e), weights: [1.0 - t, t, 0.0], known: None }
         }));
     }
-    for (f, area) in (0..).zip(areas) {
+    for (f, area) in (0..).zip(areas).filter(|&(f, _)| wanted(&mesh.faces[f as usize])) {
         let n = whole_points(area / (h * h), &mut left);
         all.extend((0..n).map(|k| {
             let [mut s, mut t] = PLASTIC.map(|step| ((k as f64 + 1.0) * step + GOLDEN).fract());
@@ -501,34 +517,135 @@ pub(super) fn nearest_balls(mesh: &MedialMesh, places: &[Vec3]) -> Result<Vec<He
     Ok(held.collect())
 }
 
-/// Points whose balls are watched for protruding, for a mesh that is a `share` of the whole.
-pub(super) fn places(mesh: &MedialMesh, share: f64) -> Vec<Held> {
-    spread_over(mesh, (share * HELD as f64) as usize)
+/// Points whose balls are watched for protruding, for a mesh that is a `share` of the whole, on the simplices that
+/// are `wanted`.
+pub(super) fn places(mesh: &MedialMesh, share: f64, wanted: impl Fn(&[u32]) -> bool) -> Vec<Held> {
+    spread_over(mesh, (share * HELD as f64) as usize, wanted)
 }
 
-/// The residuals of a medial mesh. Another one that stays is at the distance `limits` from each sample, or
-/// there is none. `near` is the primitive of each sample when the spheres were a little elsewhere, if that is
-/// known. Balls that protrude by no more than `tolerance` are left out.
+/// The primitive of a medial mesh that serves each sample of the surface, and then each interior point. `near` is what
+/// served them when the spheres were a little elsewhere, if that is known.
 ///
 /// # Errors
 /// When the medial mesh has no union.
+pub(super) fn nearest(
+    mesh: &MedialMesh,
+    points: &Points,
+    near: &[NearestPrimitive],
+) -> Result<Vec<NearestPrimitive>> {
+    let places: Vec<Vec3> = points.places().collect();
+    // A primitive that holds an interior point deeply enough is accepted: no deeper one is searched.
+    Ok(union_of(mesh)?.deepest_batch_near(&places, near, |i| points.enough(i)))
+}
+
+/// A mesh after an edit.
+pub(super) struct Edited<'a> {
+    pub before: &'a MedialMesh,
+    pub mesh: &'a MedialMesh,
+    /// For each sphere its number before; `None` for a new one. Ascending.
+    pub of: &'a [Option<u32>],
+}
+
+impl Edited<'_> {
+    /// Which spheres are new or were moved. Each new simplex has one of them as a corner.
+    pub fn moved(&self) -> Vec<bool> {
+        let spheres = self.of.iter().zip(&self.mesh.spheres);
+        let moved = spheres
+            .map(|(&of, sphere)| of.is_none_or(|old| self.before.spheres[old as usize] != *sphere));
+        moved.collect()
+    }
+
+    /// For each primitive before, by kind, the same one now, if it was not moved.
+    pub fn kept(&self, moved: &[bool]) -> Kept {
+        let Self { before, mesh, of } = self;
+        let mut spheres = vec![None; before.spheres.len()];
+        for (new, &old) in (0..).zip(*of).filter(|&(new, _)| !moved[new as usize]) {
+            if let Some(old) = old {
+                spheres[old as usize] = Some(new);
+            }
+        }
+        let same = |v: u32| spheres[v as usize];
+        let edges = before.edges.iter().map(|&[a, b]| {
+            let place = mesh.edges.binary_search(&[same(a)?, same(b)?]).ok()?;
+            Some(place as u32)
+        });
+        let faces = before.faces.iter().map(|&[a, b, c]| {
+            let place = mesh.faces.binary_search(&[same(a)?, same(b)?, same(c)?]).ok()?;
+            Some(place as u32)
+        });
+        let (edges, faces) = (edges.collect(), faces.collect());
+        Kept { spheres, edges, faces }
+    }
+}
+
+/// For each primitive before an edit, the same one after it.
+pub(super) struct Kept {
+    spheres: Vec<Option<u32>>,
+    edges: Vec<Option<u32>>,
+    faces: Vec<Option<u32>>,
+}
+
+impl Kept {
+    pub fn of(&self, primitive: Primitive) -> Option<Primitive> {
+        match primitive {
+            Primitive::Sphere(v) => self.spheres[v as usize].map(Primitive::Sphere),
+            Primitive::Edge(e) => self.edges[e as usize].map(Primitive::Edge),
+            Primitive::Face(f) => self.faces[f as usize].map(Primitive::Face),
+        }
+    }
+}
+
+/// [`nearest`] after an edit, from what it was `before`: only the part that was moved is searched, except for points
+/// that it served.
+///
+/// # Errors
+/// When the medial mesh has no union.
+pub(super) fn nearest_after(
+    mesh: &MedialMesh,
+    moved: &Part,
+    kept: &Kept,
+    points: &Points,
+    before: &[NearestPrimitive],
+) -> Result<Vec<NearestPrimitive>> {
+    let places: Vec<Vec3> = points.places().collect();
+    let (mut all, mut lost) = (Vec::with_capacity(before.len()), Vec::new());
+    let mut limits = Vec::with_capacity(before.len());
+    for (i, found) in before.iter().enumerate() {
+        let same = kept.of(found.primitive);
+        let is_enough = points.enough(i).is_some_and(|enough| found.signed <= enough);
+        if same.is_none() {
+            lost.push(i);
+        }
+        limits.push(if same.is_none() || is_enough { f64::NEG_INFINITY } else { found.signed });
+        all.push(NearestPrimitive { primitive: same.unwrap_or(found.primitive), ..*found });
+    }
+    let closer = union_of(&moved.mesh)?.below_batch(&places, &limits);
+    for (found, closer) in all.iter_mut().zip(closer) {
+        if let Some(NearestPrimitive { signed, primitive }) = closer {
+            *found = NearestPrimitive { signed, primitive: moved.in_whole(mesh, primitive) };
+        }
+    }
+    let places: Vec<Vec3> = lost.iter().map(|&i| places[i]).collect();
+    let searched = union_of(mesh)?.deepest_batch_near(&places, &[], |k| points.enough(lost[k]));
+    for (i, found) in lost.into_iter().zip(searched) {
+        all[i] = found;
+    }
+    Ok(all)
+}
+
+/// The residuals of a medial mesh, by the primitives that are `nearest` to the points. Another one that stays is at
+/// the distance `limits` from each sample, or there is none. Balls that protrude by no more than `tolerance` are left
+/// out.
 pub(super) fn residuals(
     mesh: &MedialMesh,
     goal: &Goal,
     points: &Points,
     limits: &[f64],
-    near: &[NearestPrimitive],
+    nearest: Vec<NearestPrimitive>,
     tolerance: f64,
     held: &mut [Held],
-) -> Result<Residuals> {
-    let union = union_of(mesh)?;
-    let surface = points.samples.iter().map(|sample| sample.point);
-    let places: Vec<Vec3> = surface.chain(points.interior.iter().map(|x| x.point)).collect();
+) -> Residuals {
     let count = points.samples.len();
-    // A primitive that holds an interior point deeply enough is accepted: no deeper one is searched.
-    let nearest = union.deepest_batch_near(&places, near, |i| {
-        i.checked_sub(count).map(|i| held_from(points.interior[i].depth.min(points.deep)))
-    });
     let hulls = Hulls::new(mesh);
     let limits = limits.iter().copied().chain(std::iter::repeat(f64::INFINITY));
     let mut rows = Vec::with_capacity(nearest.len());
@@ -582,7 +699,7 @@ pub(super) fn residuals(
     });
     let protruding: Vec<Option<Row>> = protruding.collect();
     rows.extend(protruding.into_iter().flatten());
-    Ok(Residuals { rows, nearest })
+    Residuals { rows, nearest }
 }
 
 pub(super) fn union_of(mesh: &MedialMesh) -> Result<MedialUnion> {

@@ -15,7 +15,7 @@
 //! 4. *Collapse* (`collapse.rs`): passes of the cheapest edges, priced by the samples that their stars
 //!    serve; a few steps of 3 after each pass, at the power 4.
 //! 5. *Swap* (`start.rs`): spheres are inserted where the error is largest, and as many edges collapsed
-//!    where it hurts least. Only the spheres around them move then (`Patch`).
+//!    where it hurts least. Only the spheres around them move then (`settle`).
 //! 6. *Rounds* (`rounds.rs`): steps of 3 at powers up to 32, between which the largest errors, found by
 //!    local ascent on both sides, join the samples, and balls are watched where the union came out of the solid;
 //!    then swaps as in 5, each with a second chance, and rounds again. The state
@@ -33,12 +33,13 @@
 //!   of the start. Those of the union are not looked at.
 //! - The error is measured at samples and by ascent from them; it is not certified. `lambda` weighs the
 //!   mean against the maximum.
-//! - No collapse, insertion or step makes two faces cross by more than 1e-6 that did not (`Sheets`, `Guard`). Faces that cross at
-//!   the start may stay crossed.
+//! - No collapse, insertion or step makes two faces cross by more than 1e-6 that did not (`Sheets`, `Guard`). Faces
+//!   that cross at the start may stay crossed. Two exceptions: while more pairs cross than half the number of faces,
+//!   as in the tangle at the axis of a tube, and where no other collapse is left.
 //! - The result depends on the samples, hence on the seed and on the orientation of the input; docs/tight.md
 //!   has figures.
 //! - The native level `error` is a bound of the two-sided error, a fraction of the diagonal, held by a
-//!   certificate. It takes several times as long as a number of spheres.
+//!   certificate. It takes two to three times as long as the number of spheres that is found.
 //!
 //! # Starting from a given mesh
 //!
@@ -99,7 +100,7 @@ pub struct Tight {
 /// The `tight` simplifier, starting from the result of `starter`.
 ///
 /// Supports [`Level::Spheres`] up to a few thousand, at the cost of some hundred evaluations of all samples, and
-/// [`Level::Native`], a bound of the two-sided error, at several times that.
+/// [`Level::Native`], a bound of the two-sided error, at two to three times that.
 pub fn method(starter: impl MedialSimplifier + 'static) -> Tight {
     let info = MethodInfo::new("tight", "Tight")
         .citation("This project; not published.")
@@ -108,7 +109,10 @@ pub fn method(starter: impl MedialSimplifier + 'static) -> Tight {
              of them together to lessen its maximum.",
         )
         .published("nothing is published: 100 spheres")
-        .native(NativeLevel::larger_is_coarser("error", "fraction of the diagonal"))
+        .native(NativeLevel {
+            is_error_bound: true,
+            ..NativeLevel::larger_is_coarser("error", "fraction of the diagonal")
+        })
         .params(TightParams::describe());
     Tight { info, starter: Arc::new(starter) }
 }
@@ -213,11 +217,23 @@ fn reduced<'a>(mut descent: Descent<'a>, count: usize, run: &RunContext) -> Resu
         let near = usize::from(spheres <= MANY * count);
         let least = if near == 1 { count } else { MANY * count };
         let target = least.max((spheres as f64 * LEFT[near]) as usize);
-        let Some(passed) = collapse::pass(&descent, target, near == 1) else { break };
-        descent = Descent::new(descent.goal, descent.points, passed.mesh)?;
-        descent.run(Objective::power(POWER, descent.largest()), STEPS[near], run)?;
+        let Some(smaller) = passed(&descent, target, near, run)? else { break };
+        descent = smaller;
     }
     Ok(descent)
+}
+
+/// The descent after one pass, far from the target or `near` to it.
+fn passed<'a>(
+    descent: &Descent<'a>,
+    target: usize,
+    near: usize,
+    run: &RunContext,
+) -> Result<Option<Descent<'a>>> {
+    let Some(passed) = collapse::pass(descent, target, near == 1) else { return Ok(None) };
+    let mut smaller = Descent::new(descent.goal, descent.points.clone(), passed.mesh)?;
+    smaller.run(Objective::power(POWER, smaller.largest()), STEPS[near], run)?;
+    Ok(Some(smaller))
 }
 
 /// Step 5, while it lowers the sum of the eighth powers.
@@ -273,102 +289,149 @@ impl TightParams {
 // ----------------------------------------------------------------------------
 // The level by error: few spheres whose two-sided error a certificate holds within a bound.
 //
-// From a state within the bound the collapse continues, to seven tenths of the spheres at first and to ever
-// larger shares after each failure. A state counts if its certified error is within the bound; one that
-// misses it by little is tried again with swaps.
+// One descent through the counts, until the largest error at samples says that the bound is near. From its meshes
+// the rounds are made for the count that is reached, and for one or two that its error foretells.
 
-/// The share of spheres that is tried first, and the one from which on the search ends.
-const FIRST_SHARE: f64 = 0.7;
-const LAST_SHARE: f64 = 0.97;
+/// The descent ends where the largest error at samples is this many times the error aimed at: swaps and rounds
+/// lower it by about as much.
+const WATCHED: f64 = 1.9;
 
-/// With an error up to this many times the bound, swaps are tried.
-const NEAR: f64 = 1.5;
+/// With an error this many times below that, it takes large passes.
+const FAR: f64 = 3.0;
 
-/// Width of the certificate, a share of the bound.
-const WIDTH: f64 = 0.02;
+/// From a count within the bound, fewer spheres by this power of the error; from one that misses it, more of them, by
+/// the error, so many times at least and at most.
+const RATE: f64 = 0.9;
+const GROWTH: [f64; 2] = [1.1, 1.6];
+
+/// Between a count that holds the bound and one that does not, this share of the error is aimed at.
+const CLOSE: f64 = 0.97;
+
+/// Counts that are tried, if one of them is within the bound; a count above this share of it is not worth it.
+const TRIALS: usize = 4;
+const ALIKE: f64 = 0.93;
+
+/// The measured error that is aimed at, a share of the bound, and the width of the certificate, another one.
+const AIM: f64 = 0.97;
+const WIDTH: f64 = 0.01;
 
 /// The search for one bound.
 struct Within<'a> {
-    pub start: &'a Start,
-    pub goal: &'a Goal,
-    pub params: &'a TightParams,
-    pub run: &'a RunContext,
+    start: &'a Start,
+    goal: &'a Goal,
+    params: &'a TightParams,
+    run: &'a RunContext,
     /// Two-sided error, a fraction of the diagonal.
-    pub bound: f64,
+    bound: f64,
 }
 
 impl Within<'_> {
-    /// The state with the fewest spheres that was found, with its certified error.
+    /// A state of few spheres within the bound, with its certified error.
     ///
     /// # Errors
     /// When the bound is no length, or no state is within it.
     pub fn fewest(&self, diagnostics: &mut Diagnostics) -> Result<State> {
         let bound = self.bound;
         level_within("error", bound, (Bound::Excluded(0.0), Bound::Excluded(f64::INFINITY)))?;
-        let mut kept = self.first(diagnostics)?;
-        let mut share = FIRST_SHARE;
-        while share < LAST_SHARE && kept.mesh.spheres.len() > 1 {
-            let count = ((kept.mesh.spheres.len() as f64 * share) as usize).max(1);
-            match self.continued(&kept.mesh, count)? {
-                Some(next) => kept = next,
-                None => share = share.sqrt(),
+        let aim = AIM * bound;
+        let limit = WATCHED * aim;
+        let meshes = self.descended(limit, diagnostics)?;
+        let finest = meshes[0].0.spheres.len();
+        let of = |(mesh, error): &(MedialMesh, f64)| (mesh.spheres.len(), *error);
+        let mut wanted = match &meshes[..] {
+            [.., above, below] if below.1 > limit => between(of(above), of(below), limit),
+            [.., last] => last.0.spheres.len(),
+            [] => unreachable!("the start is a mesh"),
+        };
+        let mut least = f64::INFINITY;
+        // The state, and the count and measured error of it and of the largest count that missed the bound.
+        let (mut within, mut held, mut missed) = (None, None, None::<(usize, f64)>);
+        for trial in 1.. {
+            let mut state = self.with(&meshes, wanted)?;
+            let now = (state.mesh.spheres.len(), state.error);
+            if state.error <= bound {
+                state.error = self.goal.certified(&state.mesh, WIDTH * bound)?;
+            }
+            least = least.min(state.error);
+            if state.error <= bound {
+                if held.is_none_or(|(spheres, _)| now.0 < spheres) {
+                    (within, held) = (Some(state), Some(now));
+                }
+            } else if missed.is_none_or(|(spheres, _)| spheres < now.0) {
+                missed = Some((now.0, now.1.max(state.error)));
+            }
+            wanted = match (held, missed) {
+                (Some(held), Some(missed)) => between(held, missed, CLOSE * aim),
+                (Some((spheres, error)), None) => {
+                    (spheres as f64 * (error / aim).powf(RATE)) as usize
+                }
+                (None, Some((spheres, _))) if spheres >= finest => break,
+                (None, Some((spheres, error))) => {
+                    let times = (error / aim).clamp(GROWTH[0], GROWTH[1]);
+                    (spheres as f64 * times).ceil().min(finest as f64) as usize
+                }
+                (None, None) => break,
+            };
+            let is_enough =
+                |(spheres, _)| wanted as f64 > ALIKE * spheres as f64 || trial >= TRIALS;
+            if held.is_some_and(is_enough) {
+                break;
             }
         }
-        Ok(kept)
+        within.ok_or_else(|| {
+            SimplifyError::Level(format!(
+                "no state within {bound} of the diagonal was found: the least two-sided error was {least:.3e}, \
+                 with up to {finest} spheres"
+            ))
+        })
     }
 
-    /// A state within the bound to begin with: more spheres until one is.
-    fn first(&self, diagnostics: &mut Diagnostics) -> Result<State> {
+    /// The meshes of a descent until the largest error at samples is above a limit, with these errors.
+    fn descended(
+        &self,
+        limit: f64,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<Vec<(MedialMesh, f64)>> {
+        let Self { start, goal, run, .. } = *self;
         let mut wanted = self.params.start.max(MANY);
-        let mut least = f64::INFINITY;
-        loop {
+        let mut descent = loop {
             // Rounded up: a start of fewer spheres than wanted is all that there is.
-            let start = self.start.mesh(wanted.div_ceil(MANY), self.run, diagnostics)?;
-            let spheres = start.spheres.len();
+            let mesh = start.mesh(wanted.div_ceil(MANY), run, diagnostics)?;
+            let spheres = mesh.spheres.len();
             bounded(spheres)?;
-            let state = self.polished(start, false)?;
-            least = least.min(state.error);
-            if let Some(state) = self.held(state)? {
-                return Ok(state);
-            }
-            if spheres < wanted || wanted >= MOST {
-                return Err(SimplifyError::Level(format!(
-                    "no state within {} of the diagonal was found: the least two-sided error was {least:.3e}, \
-                     with {spheres} spheres",
-                    self.bound
-                )));
+            let mut descent = Descent::new(goal, goal.points(MOST), mesh)?;
+            descent.run(Objective::power(POWER, descent.largest()), STEPS[1], run)?;
+            // The finest start has to do.
+            if descent.largest() < limit || spheres < wanted || wanted >= MOST {
+                break descent;
             }
             wanted = (2 * wanted).min(MOST);
+        };
+        let mut meshes = vec![(descent.mesh.clone(), descent.largest())];
+        while descent.largest() < limit && descent.mesh.spheres.len() > 1 {
+            let near = usize::from(FAR * descent.largest() > limit);
+            let target = (descent.mesh.spheres.len() as f64 * LEFT[near]) as usize;
+            let Some(smaller) = passed(&descent, target.max(1), near, run)? else { break };
+            descent = smaller;
+            meshes.push((descent.mesh.clone(), descent.largest()));
         }
+        Ok(meshes)
     }
 
-    /// The state after collapses to `count` spheres, if it is within the bound.
-    fn continued(&self, from: &MedialMesh, count: usize) -> Result<Option<State>> {
-        let descent = Descent::new(self.goal, self.goal.points(count), from.clone())?;
-        let smaller = reduced(descent, count, self.run)?.mesh;
-        if smaller.spheres.len() >= from.spheres.len() {
-            return Ok(None);
-        }
-        let mut state = self.polished(smaller, false)?;
-        if state.error > self.bound && state.error < NEAR * self.bound {
-            state = self.polished(state.mesh, true)?;
-        }
-        self.held(state)
-    }
-
-    fn polished(&self, mesh: MedialMesh, swaps: bool) -> Result<State> {
+    /// The state of a number of spheres, from the last mesh that has as many.
+    fn with(&self, meshes: &[(MedialMesh, f64)], count: usize) -> Result<State> {
         let Self { goal, params, run, .. } = *self;
-        let points = goal.points(mesh.spheres.len());
-        let descent = Descent::new(goal, points, mesh)?;
-        Polish { goal, params, run, swaps }.run(descent, &mut Diagnostics::default())
+        let enough = meshes.iter().rev().find(|(mesh, _)| mesh.spheres.len() >= count);
+        let (mesh, _) = enough.unwrap_or(&meshes[0]);
+        let descent = Descent::new(goal, goal.points(count), mesh.clone())?;
+        let descent = swapped_often(reduced(descent, count, run)?, run)?;
+        Polish { goal, params, run, swaps: true }.run(descent, &mut Diagnostics::default())
     }
+}
 
-    /// The state with its certified error, if that is within the bound.
-    fn held(&self, state: State) -> Result<Option<State>> {
-        if state.error > self.bound {
-            return Ok(None);
-        }
-        let error = self.goal.certified(&state.mesh, WIDTH * self.bound)?;
-        Ok((error <= self.bound).then_some(State { error, ..state }))
-    }
+/// The number of spheres between two at which an error is to be expected: between them the error is a power of it.
+fn between((few, large): (usize, f64), (many, small): (usize, f64), error: f64) -> usize {
+    let part = (error / large).ln() / (small / large).ln();
+    let count = few as f64 * (many as f64 / few as f64).powf(part.clamp(0.0, 1.0));
+    if count.is_finite() { count.round() as usize } else { few.midpoint(many) }
 }

@@ -15,15 +15,16 @@
 use std::collections::{BTreeSet, HashSet};
 
 use medial::Vec3;
-use medial::complex::MedialMesh;
+use medial::complex::{MedialMesh, NearestPrimitive};
 use medial::metrics::PeakSearch;
 use medial::simplifier::{Diagnostics, RunContext};
 
 use super::TightParams;
-use super::collapse::{Guard, Still, clamp};
+use super::collapse::{Guard, Part, Still, clamp};
 use super::goal::{
-    ASIDE, DEEP, Goal, Held, Interior, Points, Residuals, Row, Sample, held_from, nearest_balls,
-    places, refused, residuals, uncovered, union_of, vertices,
+    self, ASIDE, DEEP, Edited, Goal, Held, Interior, Points, Residuals, Row, Sample, held_from,
+    nearest, nearest_after, nearest_balls, places, refused, residuals, uncovered, union_of,
+    vertices,
 };
 use super::start::swapped;
 use crate::Result;
@@ -103,11 +104,7 @@ impl<'a> Polish<'a> {
         for (power, steps) in WARM {
             descent.run(Objective::power(power, descent.largest()), steps, self.run)?;
         }
-        let mut witnesses = Witnesses {
-            goal: self.goal,
-            search: self.goal.peaks().map_err(refused)?,
-            seen: HashSet::new(),
-        };
+        let mut witnesses = Witnesses::new(self.goal)?;
         let error = witnesses.measure(&mut descent)?;
         let (mut best, points) = self.rounds(descent, error, &mut witnesses)?;
         if self.swaps {
@@ -244,7 +241,12 @@ struct Witnesses<'a> {
     seen: HashSet<(u8, [i64; 3])>,
 }
 
-impl Witnesses<'_> {
+impl<'a> Witnesses<'a> {
+    fn new(goal: &'a Goal) -> Result<Self> {
+        let search = goal.peaks().map_err(refused)?;
+        Ok(Self { goal, search, seen: HashSet::new() })
+    }
+
     /// The error of a mesh, both ways. Where it is large, samples join.
     fn measure(&mut self, descent: &mut Descent<'_>) -> Result<f64> {
         let Self { goal, search, .. } = self;
@@ -385,11 +387,13 @@ pub(super) struct Descent<'a> {
     pub mesh: MedialMesh,
     pub residuals: Residuals,
     held: Vec<Held>,
+    /// How many of those are spread over the mesh: the others are at places outside.
+    spread: usize,
     /// Spheres that do not move; empty if all do.
     fixed: Vec<bool>,
     /// For each sample the distance of everything outside the mesh; may be empty.
     limits: Vec<f64>,
-    guard: Guard,
+    pub guard: Guard,
     pattern: Pattern,
     damping: f64,
 }
@@ -412,15 +416,60 @@ impl<'a> Descent<'a> {
         rest: Rest,
         share: f64,
     ) -> Result<Self> {
-        let Rest { fixed, limits, still } = rest;
         clamp(&mut mesh, goal);
-        let mut held = places(&mesh, share);
+        let nearest = nearest(&mesh, &points, &[])?;
+        let held = places(&mesh, share, |_| true);
+        Self::of_parts(goal, points, mesh, nearest, held, rest)
+    }
+
+    /// The descent of an edited mesh, with the same points; `of` has for each sphere its number in this one.
+    ///
+    /// # Errors
+    /// When the mesh has no union.
+    pub fn edited(&self, mut mesh: MedialMesh, of: &[Option<u32>]) -> Result<Self> {
+        let Self { goal, points, residuals, held, spread, .. } = self;
+        clamp(&mut mesh, goal);
+        let edited = Edited { before: &self.mesh, mesh: &mesh, of };
+        let moved = edited.moved();
+        let kept = edited.kept(&moved);
+        let part = Part::of(&mesh, &moved);
+        let nearest = nearest_after(&mesh, &part, &kept, points, &residuals.nearest)?;
+        let mut watched = places(&mesh, 1.0, |corners| corners.iter().any(|&v| moved[v as usize]));
+        watched.extend(held[..*spread].iter().filter_map(|held| {
+            let primitive = kept.of(held.primitive)?;
+            Some(Held { primitive, ..*held })
+        }));
+        Self::of_parts(goal, points.clone(), mesh, nearest, watched, Rest::default())
+    }
+
+    fn of_parts(
+        goal: &'a Goal,
+        points: Points,
+        mesh: MedialMesh,
+        nearest: Vec<NearestPrimitive>,
+        mut held: Vec<Held>,
+        rest: Rest,
+    ) -> Result<Self> {
+        let Rest { fixed, limits, still } = rest;
+        let spread = held.len();
         held.extend(nearest_balls(&mesh, &points.outside)?);
-        let residuals = residuals(&mesh, goal, &points, &limits, &[], 0.0, &mut held)?;
+        let residuals = residuals(&mesh, goal, &points, &limits, nearest, 0.0, &mut held);
         let pattern = Pattern::new(mesh.spheres.len(), &mesh.edges);
         let guard = Guard::new(&mesh, still);
         let damping = FIRST_DAMPING;
-        Ok(Self { goal, points, mesh, residuals, held, fixed, limits, guard, pattern, damping })
+        Ok(Self {
+            goal,
+            points,
+            mesh,
+            residuals,
+            held,
+            spread,
+            fixed,
+            limits,
+            guard,
+            pattern,
+            damping,
+        })
     }
 
     /// Adds points, with their residuals, to the descent of a whole mesh.
@@ -433,7 +482,8 @@ impl<'a> Descent<'a> {
             return Ok(());
         }
         let mut watched = nearest_balls(mesh, &more.outside)?;
-        let mut found = residuals(mesh, goal, &more, &[], &[], 0.0, &mut watched)?;
+        let mut found =
+            residuals(mesh, goal, &more, &[], goal::nearest(mesh, &more, &[])?, 0.0, &mut watched);
         held.extend(watched);
         rows.append(&mut found.rows);
         let of_interior = found.nearest.split_off(more.samples.len());
@@ -488,7 +538,8 @@ impl<'a> Descent<'a> {
             };
             let Self { goal, points, limits, held, residuals: Residuals { nearest, .. }, .. } =
                 self;
-            let found = residuals(&trial, goal, points, limits, nearest, tolerance, held)?;
+            let nearest = goal::nearest(&trial, points, nearest)?;
+            let found = residuals(&trial, goal, points, limits, nearest, tolerance, held);
             let lower = objective.value(&found.rows);
             // A value that is not a number is not lower, so such a step is refused.
             if lower < value {

@@ -5,16 +5,14 @@ use std::sync::Arc;
 
 use medial::Vec3;
 use medial::complex::collapse::CollapseComplex;
-use medial::complex::{
-    Crossings, MedialMesh, Primitive, Sphere, betti, crossing_faces, faces_cross,
-};
+use medial::complex::{Crossings, MedialMesh, Primitive, Sphere, betti, faces_cross};
 use medial::geometry::trees::Bounds;
 use medial::metrics::topology_warning;
 use medial::shape::Shape;
 use medial::simplifier::{Diagnostics, Level, MedialSimplifier, Params, RunContext};
 use medial::surface::Sampling;
 
-use super::collapse::{Passed, Patch};
+use super::collapse::{Passed, settle};
 use super::goal::{Goal, Row, vertices};
 use super::rounds::{Descent, LEAST_RADIUS};
 use super::{MANY, TightParams, collapse};
@@ -127,18 +125,29 @@ pub(super) struct Sheets<'a> {
     moved: Vec<Face>,
     /// Spheres that collapses moved or took away.
     is_moved: Vec<bool>,
+    /// Whether anything is refused.
+    is_strict: bool,
 }
 
 impl<'a> Sheets<'a> {
-    pub fn new(mesh: &'a MedialMesh) -> Self {
+    pub fn new(mesh: &'a MedialMesh, is_strict: bool) -> Self {
         let first = Crossings::new(mesh.faces.len(), |f| corners(mesh, mesh.faces[f as usize]));
         let pairs = first.pairs().into_iter();
         let known = pairs.map(|pair| pair.map(|f| mesh.faces[f as usize])).collect();
-        Self { mesh, first, known, moved: vec![], is_moved: vec![false; mesh.spheres.len()] }
+        let is_moved = vec![false; mesh.spheres.len()];
+        Self { mesh, first, known, moved: vec![], is_moved, is_strict }
+    }
+
+    /// Whether a face would fold over if the ends of an edge were merged at a place.
+    pub fn would_fold(&self, complex: &CollapseComplex, [a, b]: [u32; 2], at: Sphere) -> bool {
+        self.is_strict && complex.folded_face(a, b, at.centre).is_some()
     }
 
     /// Whether the faces around an edge would cross others, or each other, if its ends were merged at a place.
     pub fn would_cross(&self, complex: &CollapseComplex, [a, b]: [u32; 2], at: Sphere) -> bool {
+        if !self.is_strict {
+            return false;
+        }
         let place = |v: u32| if v == a { at.centre } else { complex.sphere(v).centre };
         let star = star(complex, [a, b]);
         let is_star = |face: &Face| face.contains(&a) || face.contains(&b);
@@ -244,22 +253,20 @@ pub(super) fn swapped<'a>(
     run: &RunContext,
 ) -> Result<Option<Descent<'a>>> {
     let count = descent.mesh.spheres.len();
-    let crossing = crossing_faces(&descent.mesh).len();
     let Some(mut mesh) = with_inserted(descent, each, skipped) else { return Ok(None) };
-    let patch = Patch { goal: descent.goal, points: &descent.points };
-    let new: Vec<u32> = (count as u32..mesh.spheres.len() as u32).collect();
-    patch.settle(&mut mesh, &new, &INSERTED, run)?;
-    let mut trial = Descent::new(descent.goal, descent.points.clone(), mesh)?;
+    let of: Vec<_> = (0..mesh.spheres.len()).map(|v| (v < count).then_some(v as u32)).collect();
+    settle(descent, &mut mesh, &of, &INSERTED, run)?;
+    let mut trial = descent.edited(mesh, &of)?;
     while trial.mesh.spheres.len() > count {
         run.step(0, 1)?;
-        let Some(Passed { mut mesh, merged }) = collapse::pass(&trial, count, true) else {
+        let Some(Passed { mut mesh, of }) = collapse::pass(&trial, count, true) else {
             return Ok(None);
         };
-        patch.settle(&mut mesh, &merged, &COLLAPSED, run)?;
-        trial = Descent::new(trial.goal, trial.points, mesh)?;
+        settle(&trial, &mut mesh, &of, &COLLAPSED, run)?;
+        trial = trial.edited(mesh, &of)?;
     }
     // Parts of a face that crosses another one count each.
-    Ok((crossing_faces(&trial.mesh).len() <= crossing).then_some(trial))
+    Ok((trial.guard.crossings() <= descent.guard.crossings()).then_some(trial))
 }
 
 /// The mesh with up to `count` spheres more, at the largest errors but the `skipped` first, no two at one

@@ -127,17 +127,31 @@ pub struct NativeLevel {
     pub unit: Text,
     /// Whether a larger value leaves fewer spheres.
     pub larger_is_coarser: bool,
+    /// Whether its value is a bound of the two-sided error, which the method holds: a search for an error bound is
+    /// one run.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_error_bound: bool,
 }
 
 impl NativeLevel {
     /// A level of which a larger value leaves fewer spheres.
     pub fn larger_is_coarser(name: impl Into<Text>, unit: impl Into<Text>) -> Self {
-        Self { name: name.into(), unit: unit.into(), larger_is_coarser: true }
+        Self {
+            name: name.into(),
+            unit: unit.into(),
+            larger_is_coarser: true,
+            is_error_bound: false,
+        }
     }
 
     /// A level of which a larger value leaves more spheres.
     pub fn larger_is_finer(name: impl Into<Text>, unit: impl Into<Text>) -> Self {
-        Self { name: name.into(), unit: unit.into(), larger_is_coarser: false }
+        Self {
+            name: name.into(),
+            unit: unit.into(),
+            larger_is_coarser: false,
+            is_error_bound: false,
+        }
     }
 }
 
