@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes the pictures of README.md and docs/ from built-in shapes, in about ten seconds.
+# Makes the pictures of README.md and docs/ from built-in shapes, in about 20 seconds.
 #
 #   scripts/pictures.sh [FOLDER]      FOLDER: where they are written [docs]
 #
@@ -11,10 +11,13 @@ medial=${MEDIAL:-target/release/medial}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# Panels take their captions from the names of the files.
-for method in qmat hem tight; do
-    "$medial" simplify builtin:bracket --method "$method" --spheres 40 -o "$work/$method.ma"
-done
-# One scale for all panels, wide enough to tell two large errors from each other.
-"$medial" render builtin:bracket "$work/qmat.ma" "$work/hem.ma" "$work/tight.ma" \
-    --show error --max-error 0.02 --size 360x270 -o "$folder/three-methods.png"
+# Panels take their captions from the names of the files. One scale for all panels of a picture.
+three() {
+    for method in qmat hem tight; do
+        "$medial" simplify "builtin:$1" --method "$method" --spheres 100 -o "$work/$method.ma"
+    done
+    "$medial" render "builtin:$1" "$work/qmat.ma" "$work/hem.ma" "$work/tight.ma" \
+        --show error --max-error "$2" --size 360x270 -o "$folder/three-methods-$1.png"
+}
+three bracket 0.01
+three blob 0.004

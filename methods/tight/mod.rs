@@ -299,16 +299,19 @@ const WATCHED: f64 = 1.9;
 /// With an error this many times below that, it takes large passes.
 const FAR: f64 = 3.0;
 
-/// From a count within the bound, fewer spheres by this power of the error; from one that misses it, more of them, by
-/// the error, so many times at least and at most.
+/// From a count within the bound, fewer spheres by this power of the error. From one that misses it, more of them by
+/// another power, so many times at least and at most: to reach the bound soon, because a miss costs a trial.
 const RATE: f64 = 0.9;
-const GROWTH: [f64; 2] = [1.1, 1.6];
+const MORE: f64 = 1.3;
+const GROWTH: [f64; 2] = [1.15, 1.6];
 
 /// Between a count that holds the bound and one that does not, this share of the error is aimed at.
 const CLOSE: f64 = 0.97;
 
-/// Counts that are tried, if one of them is within the bound; a count above this share of it is not worth it.
-const TRIALS: usize = 4;
+/// Counts that are tried, if one of them is within the bound, and more where none missed it or it is this many times the
+/// largest that did. A count above this share of it is not worth a trial.
+const TRIALS: [usize; 2] = [3, 5];
+const APART: f64 = 1.25;
 const ALIKE: f64 = 0.93;
 
 /// The measured error that is aimed at, a share of the bound, and the width of the certificate, another one.
@@ -367,13 +370,16 @@ impl Within<'_> {
                 }
                 (None, Some((spheres, _))) if spheres >= finest => break,
                 (None, Some((spheres, error))) => {
-                    let times = (error / aim).clamp(GROWTH[0], GROWTH[1]);
+                    let times = (error / aim).powf(MORE).clamp(GROWTH[0], GROWTH[1]);
                     (spheres as f64 * times).ceil().min(finest as f64) as usize
                 }
                 (None, None) => break,
             };
-            let is_enough =
-                |(spheres, _)| wanted as f64 > ALIKE * spheres as f64 || trial >= TRIALS;
+            let is_enough = |(spheres, _)| {
+                let spheres = spheres as f64;
+                let is_far = missed.is_none_or(|(missed, _)| spheres > APART * missed as f64);
+                wanted as f64 > ALIKE * spheres || trial >= TRIALS[usize::from(is_far)]
+            };
             if held.is_some_and(is_enough) {
                 break;
             }
