@@ -487,7 +487,10 @@ impl<'s> Solid<'s> {
     }
 
     fn touched<'a>(&'a self, points: &'a SurfacePoints) -> Touched<'a> {
-        if self.touches_mesh { Touched::Mesh(&self.tree) } else { Touched::Points(&points.nearest) }
+        match self.touches_mesh {
+            true => Touched::Mesh(&self.tree),
+            false => Touched::Points(&points.nearest, &points.positions),
+        }
     }
 
     /// The medial ball of a surface point; `None` where the faces around a vertex cancel.

@@ -11,9 +11,8 @@
 
 use medial::Vec3;
 use medial::complex::Sphere;
+use medial::geometry::trees::PointTree;
 use medial::surface::TriangleBvh;
-
-use super::points::PointGroups;
 
 /// Steps at most.
 const STEPS: usize = 30;
@@ -31,7 +30,7 @@ const IN_FRONT: f64 = 1e-12;
 /// The points that a ball may touch.
 #[derive(Clone, Copy)]
 pub(super) enum Touched<'a> {
-    Points(&'a PointGroups),
+    Points(&'a PointTree, &'a [Vec3]),
     Mesh(&'a TriangleBvh),
 }
 
@@ -39,9 +38,9 @@ impl Touched<'_> {
     /// The nearest point, `None` if the query is not finite.
     fn nearest(&self, query: Vec3) -> Option<(Vec3, f64)> {
         match self {
-            Self::Points(points) => {
-                let (point, squared) = points.nearest(query)?;
-                Some((point, squared.sqrt()))
+            Self::Points(tree, positions) => {
+                let (point, squared) = tree.nearest(query)?;
+                Some((positions[point as usize], squared.sqrt()))
             }
             Self::Mesh(tree) => {
                 let closest = tree.closest(query);
@@ -163,8 +162,8 @@ mod tests {
             Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
         };
         let positions: Vec<Vec3> = (0..2_000).map(direction).collect();
-        let groups = PointGroups::new(&positions);
-        let touched = Touched::Points(&groups);
+        let tree = PointTree::new(&positions);
+        let touched = Touched::Points(&tree, &positions);
         for &p in positions.iter().step_by(17) {
             let Ball { sphere, steps, end } = shrinking_ball(p, p, 2.0, touched);
             assert_eq!((steps, end), (1, End::Empty));
@@ -186,8 +185,8 @@ mod tests {
             }
         }
         let positions: Vec<Vec3> = points.iter().map(|&(p, _)| p).collect();
-        let groups = PointGroups::new(&positions);
-        let touched = Touched::Points(&groups);
+        let tree = PointTree::new(&positions);
+        let touched = Touched::Points(&tree, &positions);
         let mut steps = 0;
         for &(p, normal) in points.iter().step_by(20) {
             let ball = shrinking_ball(p, normal, 2.6, touched);
@@ -204,8 +203,8 @@ mod tests {
     fn a_contact_in_front_of_the_surface_ends_the_search() {
         // A normal that is no unit vector: no ball that touches its plane holds a point in front of it.
         let positions = [Vec3::new(0.3, 0.0, 0.05)];
-        let groups = PointGroups::new(&positions);
-        let touched = Touched::Points(&groups);
+        let tree = PointTree::new(&positions);
+        let touched = Touched::Points(&tree, &positions);
         let ball = shrinking_ball(Vec3::ZERO, 0.5 * Vec3::Z, 1.0, touched);
         assert_eq!((ball.steps, ball.end), (0, End::InFront));
     }
