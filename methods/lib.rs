@@ -84,8 +84,8 @@ pub fn registry() -> Vec<Registered> {
             .sweep(&[1.1, 1.25, 1.5, 2.0]),
         Registered::from(tam_heidrich::method())
             .best_for(
-                "Removing whole features of little volume, while loops stay and a surface is \
-                 rebuilt by the power crust; it does not reach small numbers of spheres.",
+                "Removing whole features of little volume, while loops stay; it does not reach \
+                 small numbers of spheres.",
             )
             .filter(Level::Published)
             .sweep(&[0.1, 1.0, 5.0]),

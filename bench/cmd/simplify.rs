@@ -2,16 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use medial::complex;
 use medial::complex::MedialMesh;
 use medial::metrics::topology_warning;
 use medial::shape::Shape;
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
-use medial::surface::{Sampling, TriMesh};
-use medial::{complex, surface};
+use medial::surface::Sampling;
+use medial_methods::aof;
 use medial_methods::aof::LatticeVoxels;
-use medial_methods::tam_heidrich::{OuterPoles, PartInfo, RemainingPoles};
-use medial_methods::{aof, tam_heidrich};
+use medial_methods::tam_heidrich::PartInfo;
 use medial_reports::{Simplify, Status, file_stem, significant};
 use serde::Serialize;
 use serde_json::json;
@@ -20,7 +20,7 @@ use crate::args::{
     Global, MeasureArguments, MeshArgument, SubstrateArguments, key_value, method, params,
 };
 use crate::exit::{Exit, Failure};
-use crate::files::{COINCIDENT, SURFACES, check_extension, check_folder, check_output, shape_of};
+use crate::files::{check_extension, check_folder, check_output, shape_of};
 use crate::measure::answer::{Bounds, Budget, Fault, LevelRun, answer, preparing};
 use crate::measure::search::Found;
 use crate::measure::{fill_costs, fill_result};
@@ -312,59 +312,33 @@ struct Outputs {
     /// Write the voxels with their distance and flux (.csv), for methods on a lattice.
     #[arg(long, value_name = "FILE")]
     voxels: Option<PathBuf>,
-    /// Write the power crust of the remaining poles (.ply, .off, .obj), for methods that prune by parts.
-    #[arg(long, value_name = "FILE")]
-    power_crust: Option<PathBuf>,
-    /// Build the power crust from these outer poles.
-    #[arg(long, value_enum, default_value_t = Outer::All, requires = "power_crust")]
-    outer_poles: Outer,
-}
-
-/// Outer poles of a power crust.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Outer {
-    /// The outer poles of all samples.
-    All,
-    /// Without the outer poles of removed features: sharper where the shape has corners.
-    Remaining,
 }
 
 impl Outputs {
     /// Refuses outputs that the method lacks or that cannot be written, before any computation.
     ///
     /// # Errors
-    /// When an extension is unknown, a folder is missing, or the method has no voxels or poles.
+    /// When an extension is unknown, a folder is missing, or the method has no voxels.
     fn check(&self, method: &dyn MedialSimplifier) -> Result<(), Failure> {
-        let info = method.info();
         check_output(self.output.as_deref())?;
-        for (path, option, extra, what, extensions) in [
-            (&self.voxels, "--voxels", aof::VOXELS, "voxels", &["csv"][..]),
-            (&self.power_crust, "--power-crust", tam_heidrich::POLES, "poles", &SURFACES),
-        ] {
-            let Some(path) = path else { continue };
-            if !info.has_extra(extra) {
-                return Err(Failure::usage(format!("{option}: {} has no {what}", info.id)));
-            }
-            check_extension(path, extensions)?;
-            check_folder(path)?;
+        let Some(path) = &self.voxels else { return Ok(()) };
+        let info = method.info();
+        if !info.has_extra(aof::VOXELS) {
+            return Err(Failure::usage(format!("--voxels: {} has no voxels", info.id)));
         }
-        Ok(())
+        check_extension(path, &["csv"])?;
+        check_folder(path)
     }
 
     fn is_empty(&self) -> bool {
-        self.output.is_none() && self.voxels.is_none() && self.power_crust.is_none()
+        self.output.is_none() && self.voxels.is_none()
     }
 
     /// Writes the requested files.
     ///
     /// # Errors
-    /// When the poles have no power crust, and then nothing is written, or when a file cannot be written.
+    /// When a file cannot be written.
     fn write(&self, result: &Simplified, shape: &Shape) -> Result<(), Failure> {
-        // Before the first file is written: only its construction shows whether there is a crust.
-        let crust = match (&self.power_crust, result.extras.get()) {
-            (Some(path), Some(poles)) => Some((path, self.crust(path, poles, shape)?)),
-            _ => None,
-        };
         if let Some(path) = &self.output {
             let back = shape.normalisation();
             let mesh = result.mesh.transformed(back.diagonal, |p| back.backward(p));
@@ -373,40 +347,12 @@ impl Outputs {
         if let (Some(path), Some(voxels)) = (&self.voxels, result.extras.get::<LatticeVoxels>()) {
             write_voxels(path, voxels, shape)?;
         }
-        if let Some((path, crust)) = crust {
-            surface::write(path, &crust).map_err(Failure::input)?;
-        }
         Ok(())
-    }
-
-    /// The power crust for the file `path`, in the units of the surface.
-    fn crust(
-        &self,
-        path: &Path,
-        poles: &RemainingPoles,
-        shape: &Shape,
-    ) -> Result<TriMesh, Failure> {
-        let outer = match self.outer_poles {
-            Outer::All => OuterPoles::All,
-            Outer::Remaining => OuterPoles::OfRemaining,
-        };
-        let crust = poles.power_crust(shape, outer).map_err(|error| Failure::at(path, error))?;
-        let mut crust = surface::crust_surface(&crust, COINCIDENT).mesh;
-        if crust.faces.is_empty() {
-            return Err(Failure::at(path, "no pole remains for a surface; request a finer level"));
-        }
-        let back = shape.normalisation();
-        crust.vertices.iter_mut().for_each(|vertex| *vertex = back.backward(*vertex));
-        Ok(crust)
     }
 
     /// A line for each written file.
     fn written(&self) -> Vec<String> {
-        let files = [
-            (&self.output, ""),
-            (&self.voxels, ", a point for each voxel"),
-            (&self.power_crust, ", the power crust of the remaining poles"),
-        ];
+        let files = [(&self.output, ""), (&self.voxels, ", a point for each voxel")];
         let written = files.into_iter().filter_map(|(path, what)| {
             path.as_ref().map(|path| format!("written: {}{what}", path.display()))
         });

@@ -75,10 +75,7 @@
 //!   counts with its tetrahedron; its sheets are smaller and more, since Voronoi vertices near the surface
 //!   do not converge to the axis.
 //! - A part that equals a threshold is removed.
-//! - The power crust (section 5) is not made here. The poles for it, inner ones on the remaining parts and
-//!   outer ones with or without those of removed features, come from the extras ([`RemainingPoles`], file
-//!   `axis.rs`); the spheres of the medial mesh are no substitute, since most of them are corners of sheets
-//!   and not poles. With an external medial mesh or `axis=initial` there are none.
+//! - The power crust of the remaining poles (section 5) is not made.
 
 mod axis;
 mod parts;
@@ -87,7 +84,6 @@ mod schedule;
 mod tests;
 
 use axis::Axis;
-pub use axis::{OuterPoles, RemainingPoles};
 use medial::Vec3;
 use medial::complex::{MedialMesh, betti};
 use medial::shape::Shape;
@@ -101,9 +97,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::levels::{level_within, some_spheres, within};
 use crate::{Prepared, Result};
-
-/// Name of the extra that holds the poles that are left, [`RemainingPoles`].
-pub const POLES: &str = "poles";
 
 /// Name of the extra that lists the parts, a `Vec` of [`PartInfo`].
 pub const PARTS: &str = "parts";
@@ -144,8 +137,7 @@ pub fn method() -> Method<TamHeidrichParams> {
         .native(NativeLevel::larger_is_coarser("t_v", "per cent of the solid's volume"))
         .published("up to three rounds with t_t = 5 triangles, then two with t_v = 1 %")
         .params(TamHeidrichParams::describe())
-        .extra(Capability::new(PARTS, "the parts that the axis was cut into, the largest first"))
-        .extra(Capability::new(POLES, "inner poles on the remaining parts, for the power crust"));
+        .extra(Capability::new(PARTS, "the parts that the axis was cut into, the largest first"));
     Method::new(info, prepare)
 }
 
@@ -181,13 +173,7 @@ impl Simplification for PreparedTamHeidrich {
         let Pruning { mut remaining, mut parts, mut diagnostics, .. } = pruning;
         let mut listed = describe(&parts, &remaining);
         self.remove_by_hand(&mut remaining, &mut parts, &mut listed, &mut diagnostics)?;
-        let mut extras = Extras::with(listed);
-        let poles = self.axis.poles.as_ref();
-        extras.insert(
-            poles.map_or_else(RemainingPoles::default, |poles| {
-                poles.remaining(&remaining.sphere_kept)
-            }),
-        );
+        let extras = Extras::with(listed);
         Ok(Simplified { mesh: remaining.mesh(), asked: level, native_level, diagnostics, extras })
     }
 }

@@ -71,32 +71,6 @@ fn the_tolerance_is_as_coarse_as_the_topology_allows() {
 }
 
 #[test]
-fn remaining_poles_have_a_power_crust() {
-    let at = folder();
-    let volume = |outer: &str| {
-        let path = at("crust.ply");
-        let words = ["simplify", "builtin:box", "-m", "tam-heidrich", "--set", "t_v=100"];
-        let more = ["--power-crust", &path, "--outer-poles", outer];
-        assert!(done(&[&words[..], &more].concat()).contains("the power crust"));
-        let (_, info) = json(&["info", &path]);
-        assert_eq!(info["closed"], true, "{info}");
-        info["volume"].as_f64().expect("a volume")
-    };
-    let [all, remaining] = ["all", "remaining"].map(volume);
-    // The box of 3 by 2 by 1 loses its edges with their sheets, less so without their outer poles.
-    assert!(4.0 < all && all < remaining && remaining < 6.5, "{all} {remaining}");
-    let no_poles = ["simplify", "builtin:box", "-m", "qmat", "--power-crust", "x.ply"];
-    refused(&no_poles, 2, "qmat has no poles");
-    // Spheres from a file have no poles. Then no file is written, not even the result.
-    let [given, pruned, crust] = ["given.ma", "pruned.ma", "none.ply"].map(&at);
-    done(&["axis", "builtin:box", "-o", &given]);
-    let words = ["simplify", "builtin:box", "-m", "tam-heidrich", "--initial", &given];
-    let more = ["-o", &pruned, "--power-crust", &crust];
-    refused(&[&words[..], &more].concat(), 1, "no pole remains");
-    assert!(![pruned, crust].iter().any(|path| std::path::Path::new(path).exists()));
-}
-
-#[test]
 fn requests_without_a_surface_are_refused() {
     let at = folder();
     let write = |name: &str, text: &str| {

@@ -8,7 +8,7 @@ use medial::shape::Shape;
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
 use medial::surface::{self, TriMesh};
 use medial_methods::Result;
-use medial_methods::tam_heidrich::{self, OuterPoles, PartInfo, RemainingPoles, parts_of_faces};
+use medial_methods::tam_heidrich::{self, PartInfo, parts_of_faces};
 
 use crate::common::{self, count, default_shape, shape_of, with_threads};
 
@@ -209,37 +209,6 @@ fn another_seed_leaves_nearly_as_many_spheres() {
         let [least, most] = [least, most].map(|n| *n.expect("four") as f64);
         assert!(most <= 1.03 * least, "{id}: {left:?}");
     }
-}
-
-/// The surface of the remaining poles, in units of the box of 3 by 2 by 1.
-#[test]
-fn the_power_crust_takes_the_poles_that_are_left() {
-    let shape = default_shape("box");
-    let diagonal = shape.normalisation().diagonal;
-    let volume = |poles: &RemainingPoles, outer| {
-        let crust = poles.power_crust(&shape, outer).expect("a crust");
-        let report = surface::validate(&(&crust).into()).expect("a closed surface");
-        report.volume.expect("closed") * diagonal.powi(3)
-    };
-    let poles = |result: &Simplified| result.extras.get::<RemainingPoles>().expect("poles").clone();
-    let outer = |poles: &RemainingPoles, which| poles.outer(&shape, which).expect("outer poles");
-    let whole = poles(&at(&shape, &NO_ROUNDS, Level::Published));
-    assert!(whole.inner.len() > 50, "{}", whole.inner.len());
-    let samples = shape.samples();
-    for ball in whole.inner.iter().chain(&outer(&whole, OuterPoles::All)) {
-        let nearest = samples.iter().map(|&s| s.distance(ball.centre)).fold(f64::MAX, f64::min);
-        assert!((nearest - ball.radius).abs() < 1e-9, "polar balls, neither moved nor grown");
-    }
-    let full = volume(&whole, OuterPoles::All);
-    assert!((full - 6.0).abs() < 0.4, "{full}");
-    // Without the sheets to its edges the box is rounded, less so without their outer poles.
-    let pruned = poles(&at(&shape, &[("t_v", "100")], Level::Published));
-    assert!(pruned.inner.len() < whole.inner.len());
-    assert!(pruned.inner.iter().all(|ball| whole.inner.contains(ball)));
-    let numbers = [OuterPoles::All, OuterPoles::OfRemaining].map(|o| outer(&pruned, o).len());
-    assert!(numbers[1] < numbers[0], "{numbers:?}");
-    let [all, remaining] = [OuterPoles::All, OuterPoles::OfRemaining].map(|o| volume(&pruned, o));
-    assert!(all < remaining, "{all} {remaining} {full}");
 }
 
 #[test]
