@@ -7,7 +7,7 @@ mod plan;
 use std::f64::consts::{PI, TAU};
 use std::hint::black_box;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion};
 use medial::geometry::Sphere;
@@ -130,6 +130,4 @@ criterion_group! {
     targets = closest_point, sidedness, union_distance
 }
 
-fn main() {
-    plan::run(&[], benches);
-}
+criterion_main!(benches);

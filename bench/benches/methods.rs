@@ -8,7 +8,7 @@ mod plan;
 
 use std::hint::black_box;
 
-use criterion::{BatchSize, BenchmarkId, Criterion, SamplingMode, criterion_group};
+use criterion::{BatchSize, BenchmarkId, Criterion, SamplingMode, criterion_group, criterion_main};
 use medial::complex::collapse::Hierarchy;
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, MedialSimplifier, Params, Registered, RunContext};
@@ -23,16 +23,6 @@ const SIZES: [(&str, u32); 6] =
 
 /// The smallest size, for `tight`.
 const SMALLEST: (&str, u32) = ("box", 8);
-
-/// Seconds beyond those that each benchmark has, by parts of names: ten runs and those before them.
-const SLOW: [(&str, f64); 6] = [
-    ("tight/", 55.0),
-    ("hem/blob", 12.0),
-    ("hem/box", 5.0),
-    ("aof/", 5.0),
-    ("sat/", 2.0),
-    ("tam-heidrich/", 1.0),
-];
 
 /// A built-in shape, with its name and its number of vertices as a benchmark's.
 fn built_in((id, resolution): (&str, u32)) -> (String, Input) {
@@ -129,6 +119,4 @@ criterion_group! {
     targets = substrates, methods, hierarchy, tight
 }
 
-fn main() {
-    plan::run(&SLOW, benches);
-}
+criterion_main!(benches);

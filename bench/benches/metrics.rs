@@ -4,7 +4,7 @@ mod plan;
 
 use std::hint::black_box;
 
-use criterion::{BenchmarkId, Criterion, criterion_group};
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use medial::complex::{MedialMesh, MedialUnion, betti};
 use medial::metrics::{JudgeOptions, VolumeOptions, spikes, triangle_quality, volume_error};
 use medial::shape::{Shape, ShapeOptions};
@@ -62,6 +62,4 @@ fn metrics(criterion: &mut Criterion) {
 
 criterion_group! { name = benches; config = plan::criterion(); targets = metrics }
 
-fn main() {
-    plan::run(&[], benches);
-}
+criterion_main!(benches);

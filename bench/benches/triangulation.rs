@@ -6,7 +6,7 @@ mod plan;
 
 use std::hint::black_box;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use medial::Vec3;
 use medial::complex::UnionAxis;
 use medial::geometry::delaunay::Delaunay;
@@ -142,6 +142,4 @@ criterion_group! {
     targets = predicates, triangulations, unions
 }
 
-fn main() {
-    plan::run(&[("union axis", 1.0)], benches);
-}
+criterion_main!(benches);
