@@ -201,7 +201,7 @@ diff
   medial diff old new
 history
   medial compare --methods qmat --out today
-  medial history runs --add today --commit 1a2b3c4d --date 2026-01-31 -o history.html
+  medial history runs --add today --commit 1a2b3c4d --date 2026-01-31
 ";
 
 /// The examples of a verb, or of the command, as they are shown.

@@ -9,7 +9,6 @@ use serde_json::{json, to_value};
 
 use crate::args::{Global, positive};
 use crate::exit::{Exit, Failure};
-use crate::files;
 use crate::output::{note, print_json, print_line};
 use crate::store::RESULTS;
 
@@ -27,9 +26,6 @@ pub struct Arguments {
     /// Set the date of the commit, as printed by `git show -s --format=%cI`.
     #[arg(long, value_name = "DATE", requires = "add")]
     date: Option<String>,
-    /// Write a page.
-    #[arg(long, short, value_name = "PAGE.html")]
-    output: Option<PathBuf>,
     /// Ignore changes of seconds or memory below this fraction.
     #[arg(long, value_name = "SHARE", value_parser = positive, default_value_t = 0.05)]
     least_step: f64,
@@ -38,11 +34,9 @@ pub struct Arguments {
 /// Runs the verb.
 ///
 /// # Errors
-/// When the results or the history cannot be read, the run cannot be added, or the page cannot be written.
+/// When the results or the history cannot be read, or the run cannot be added.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
-    let Arguments { folder, output, least_step, .. } = arguments;
-    // Before a run is added, which cannot be undone.
-    output.as_deref().map_or(Ok(()), files::check_folder)?;
+    let Arguments { folder, least_step, .. } = arguments;
     let (added, mut warnings) = add(arguments)?;
     let (runs, damaged) = read_runs(folder).map_err(Failure::input)?;
     warnings.extend(damaged.iter().map(|error| format!("skipped: {error}")));
@@ -52,10 +46,6 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         return Err(Failure { code: Exit::NothingMeasured, message });
     }
     let findings = Findings::of(&runs, *least_step);
-    if let Some(page) = output {
-        let html = findings.to_html(&warnings);
-        files::write(page, html.as_bytes())?;
-    }
     if global.json {
         let mut object = to_value(&findings).map_err(Failure::input)?;
         object["added"] = json!(added);

@@ -1,10 +1,10 @@
-//! The findings as Markdown for terminals, and as a page.
+//! The findings as Markdown.
 
 use serde_json::Value;
 
 use super::{Change, Findings};
-use crate::tables::{Cell, Table, left_out, to_html, to_markdown};
-use crate::text::{counted, escape_html, significant};
+use crate::tables::{Cell, Table, left_out, to_markdown};
+use crate::text::{counted, significant};
 
 /// More rows of one kind are counted, not listed: the JSON has them all.
 const MOST_ROWS: usize = 40;
@@ -20,29 +20,6 @@ impl Findings<'_> {
             text.push_str(&format!("\n{}", to_markdown(&table)));
         }
         text
-    }
-
-    /// The findings as a page without a script. `remarks`, such as damaged files, come first.
-    pub fn to_html(&self, remarks: &[String]) -> String {
-        let style = include_str!("../page/page.css");
-        let mut html = format!(
-            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <title>{title}</title>\n<style>{style}</style>\n</head>\n<body>\n\
-             <header><h1>{title}</h1></header>\n<main>\n<p class=\"notice\"><strong>{summary}</strong></p>\n",
-            title = escape_html(&self.title()),
-            summary = escape_html(&self.summary()),
-        );
-        for line in remarks.iter().chain(&self.settings()) {
-            html.push_str(&format!("<p class=\"notice\">{}</p>\n", escape_html(line)));
-        }
-        for table in self.tables() {
-            let notes = table.notes.iter().map(|note| format!("<p>{}</p>\n", escape_html(note)));
-            let notes = notes.collect::<String>();
-            html.push_str(&format!("<h2>{}</h2>\n{notes}", escape_html(&table.caption)));
-            html.push_str(&to_html(&table));
-        }
-        html + "</main>\n</body>\n</html>\n"
     }
 
     fn title(&self) -> String {

@@ -7,7 +7,7 @@ mod mesh;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
-use crate::text::{escape_html, printable};
+use crate::text::printable;
 
 pub(crate) use self::csv::{flatten, to_csv, warnings};
 pub(crate) use self::mesh::{Best, mesh_table, remark, topology_word};
@@ -126,10 +126,6 @@ impl Column {
     pub(crate) fn text(title: impl Into<String>) -> Self {
         Self { title: title.into(), number: false }
     }
-
-    fn class(&self) -> &'static str {
-        if self.number { " class=\"num\"" } else { "" }
-    }
 }
 
 /// The mark of an empty cell.
@@ -191,25 +187,6 @@ pub(crate) fn to_markdown(table: &Table) -> String {
         })));
     }
     text
-}
-
-/// The table as HTML, in a box that scrolls sideways where the page is narrow.
-pub(crate) fn to_html(table: &Table) -> String {
-    let mut html = String::from("<div class=\"scroll\"><table>\n<thead><tr>");
-    for column in &table.columns {
-        html.push_str(&format!("<th{}>{}</th>", column.class(), escape_html(&column.title)));
-    }
-    html.push_str("</tr></thead>\n<tbody>\n");
-    for row in &table.rows {
-        html.push_str("<tr>");
-        for (cell, column) in row.iter().zip(&table.columns) {
-            let text = escape_html(&cell.text);
-            let text = if cell.best { format!("<strong>{text}</strong>") } else { text };
-            html.push_str(&format!("<td{}>{text}</td>", column.class()));
-        }
-        html.push_str("</tr>\n");
-    }
-    html + "</tbody>\n</table></div>\n"
 }
 
 fn markdown_line(cells: impl Iterator<Item = String>) -> String {

@@ -216,18 +216,3 @@ fn alternating_machines_are_compared_separately() {
     assert_eq!(places, [42, 42, 42, 42, 40, 40, 40, 40]);
     assert!(findings.to_markdown().contains("Another"));
 }
-
-#[test]
-fn pages_escape_names_and_hold_no_script() {
-    let runs = runs(30, |run, record, _| {
-        if run == 29 && record.simplify.method == "hem" {
-            record.evaluate.as_mut().expect("measured").betti = [2, 0, 0];
-        }
-        record.mesh.push_str("<b>");
-    });
-    let findings = Findings::of(&runs, 0.05);
-    let html = findings.to_html(&["a remark".to_owned()]);
-    assert!(!html.contains("<script") && !html.contains("<b>") && !html.contains("http"));
-    assert!(html.contains("right → wrong") && html.contains("a remark"));
-    assert!(html.contains("4 regressions"));
-}
