@@ -62,12 +62,6 @@ pub fn descendants(pid: u32) -> Vec<u32> {
     found.split_off(1)
 }
 
-/// Resident bytes of a process and of all its descendants, together.
-pub fn resident_bytes(pid: u32) -> u64 {
-    let tree = std::iter::once(pid).chain(descendants(pid));
-    tree.filter_map(Stat::of).map(|stat| stat.resident_bytes).sum()
-}
-
 /// Kills all descendants of this process, a worker. Returns the number that still ran.
 ///
 /// Only for a process all of whose children are its own, because it reaps them too.

@@ -145,7 +145,7 @@ impl Store {
     /// When they cannot be written.
     pub fn append(&mut self, records: &[Record]) -> Result<(), StoreError> {
         self.added += records.len();
-        Ok(self.journal.append_lines(records)?)
+        Ok(self.journal.append(records)?)
     }
 }
 

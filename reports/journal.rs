@@ -9,7 +9,6 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use medial::write_atomically;
-use serde::Serialize;
 
 use crate::record::Record;
 
@@ -34,38 +33,18 @@ impl Journal {
         }
     }
 
-    /// Adds lines in one piece, and waits until they are on the disk. They must hold no number
-    /// that is not finite: JSON has none.
+    /// Adds records in one piece, and waits until they are on the disk.
     ///
     /// # Errors
-    /// [`JournalError::Io`] when writing fails.
-    pub fn append_lines(&mut self, lines: &[impl Serialize]) -> Result<(), JournalError> {
-        let mut bytes = Vec::new();
-        for line in lines {
-            serde_json::to_writer(&mut bytes, line).map_err(|error| JournalError::Io {
-                path: self.path.clone(),
-                source: error.into(),
-            })?;
-            bytes.push(b'\n');
-        }
-        self.write(&bytes)
-    }
-
-    /// Writes by one call, so that lines of two processes do not mix, and waits for the disk.
-    fn write(&mut self, bytes: &[u8]) -> Result<(), JournalError> {
+    /// [`JournalError::Unreadable`] when a record holds a number that JSON cannot carry (not
+    /// finite); nothing is written then. [`JournalError::Io`] when writing fails.
+    pub fn append(&mut self, records: &[Record]) -> Result<(), JournalError> {
+        let lines: String = records.iter().map(to_line).collect::<Result<_, _>>()?;
+        // One call, so that lines of two processes do not mix.
         self.file
-            .write_all(bytes)
+            .write_all(lines.as_bytes())
             .and_then(|()| self.file.sync_data())
             .map_err(|source| JournalError::Io { path: self.path.clone(), source })
-    }
-
-    /// Adds one record and waits until it is on the disk.
-    ///
-    /// # Errors
-    /// [`JournalError::Unreadable`] when the record holds a number that JSON cannot carry (not
-    /// finite); nothing is written then. [`JournalError::Io`] when writing fails.
-    pub fn append(&mut self, record: &Record) -> Result<(), JournalError> {
-        self.write(to_line(record)?.as_bytes())
     }
 }
 

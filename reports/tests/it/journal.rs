@@ -12,7 +12,7 @@ fn records_read_back_bit_for_bit() {
     let path = folder.path().join("results.jsonl");
     let records = comparison(&["bear", "dolphin"], &["qmat", "angle"], &[500, 100]);
     let mut journal = Journal::open(&path).unwrap();
-    records.iter().for_each(|record| journal.append(record).unwrap());
+    journal.append(&records).unwrap();
     let read = read_records(&path).unwrap();
     assert_eq!((read.records.as_slice(), read.bad_lines.len()), (records.as_slice(), 0));
     write_records(&path, &records[1..]).unwrap();
@@ -27,7 +27,7 @@ fn numbers_without_a_json_form_are_rejected_and_not_written() {
     for value in [f64::NAN, f64::INFINITY] {
         let mut record = ok("bear", "qmat", 100, 0, 0);
         record.evaluate.as_mut().unwrap().distances.mean = value;
-        assert!(matches!(journal.append(&record), Err(JournalError::Unreadable { .. })));
+        assert!(matches!(journal.append(&[record]), Err(JournalError::Unreadable { .. })));
     }
     assert_eq!(fs::read(&path).unwrap(), b"");
 }
@@ -57,7 +57,7 @@ proptest! {
         prop_assert_eq!(read.bad_lines.iter().filter(|line| line.torn).count(), usize::from(torn));
         prop_assert_eq!(read.bad_lines.len(), usize::from(torn));
         let last = ok("plane", "angle", 100, 1, 1);
-        Journal::open(&path).unwrap().append(&last).unwrap();
+        Journal::open(&path).unwrap().append(std::slice::from_ref(&last)).unwrap();
         let read = read_records(&path).unwrap();
         prop_assert_eq!(read.records.last(), Some(&last));
         prop_assert_eq!(read.records.len(), complete + 1);
