@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use crate::exec::RunError;
 use crate::store::StoreError;
 use crate::study::StudyError;
+use crate::study::edition::EditionError;
 use crate::study::external::AxisError;
 use crate::study::library::PublicError;
 use crate::study::source::InputError;
@@ -103,6 +104,18 @@ impl From<PublicError> for Failure {
         match error {
             // The rest are names of the command line.
             PublicError::File { .. } => Self::input(error),
+            _ => Self::usage(error),
+        }
+    }
+}
+
+impl From<EditionError> for Failure {
+    fn from(error: EditionError) -> Self {
+        match error {
+            EditionError::File { .. }
+            | EditionError::Changed { .. }
+            | EditionError::Definitions { .. } => Self::input(error),
+            // The rest are options of the command line.
             _ => Self::usage(error),
         }
     }

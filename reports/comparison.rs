@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::Target;
 
-use crate::metric::HAUSDORFF;
+use crate::metric::{COMPARED, FROZEN_SECONDS, HAUSDORFF, Metric};
 use crate::record::{Record, Status};
 use crate::text::{counted, grouped, printable, trimmed};
 
@@ -166,9 +166,32 @@ impl<'a> Comparison<'a> {
         self.entries.iter().filter(|entry| entry.measured()).count()
     }
 
+    /// The origin of the rows of an edition and of their seconds; `None` without such rows.
+    pub(crate) fn edition_note(&self) -> Option<String> {
+        let frozen = self.entries.iter().filter(|entry| entry.record.edition.is_some());
+        let machines: BTreeSet<String> =
+            frozen.clone().map(|entry| entry.record.machine.to_string()).collect();
+        let machines: Vec<String> = machines.into_iter().collect();
+        let name = frozen.clone().find_map(|entry| entry.record.edition.as_deref())?;
+        Some(format!(
+            "Rows marked ({name}) are frozen results of edition {name} and did not run here. Frozen time: their \
+             seconds on {}, which are in no other column and no plot.",
+            machines.join("; ")
+        ))
+    }
+
+    /// The columns of tables: [`COMPARED`], with the seconds of an edition if it has rows.
+    pub(crate) fn columns(&self) -> Vec<&'static Metric> {
+        let frozen = self.entries.iter().any(|entry| entry.record.edition.is_some());
+        COMPARED.into_iter().chain(frozen.then_some(&FROZEN_SECONDS)).collect()
+    }
+
     /// Warnings on comparing these records.
     pub(crate) fn cautions(&self) -> Vec<String> {
-        let records = || self.entries.iter().map(|entry| entry.record);
+        // An edition is marked in each row.
+        let records = || {
+            self.entries.iter().map(|entry| entry.record).filter(|record| record.edition.is_none())
+        };
         let mut cautions = Vec::new();
         if self.superseded > 0 {
             let records = counted(self.superseded, "earlier record was", "earlier records were");
@@ -185,8 +208,8 @@ impl<'a> Comparison<'a> {
                 processors.len()
             ));
         }
-        let with_result = records().filter(|record| record.status.has_result()).count();
-        let unmeasured = with_result - self.measured();
+        let has_result = |record: &&Record| record.status.has_result();
+        let unmeasured = records().filter(|r| has_result(r) && r.evaluate.is_none()).count();
         if unmeasured > 0 {
             cautions.push(format!("{unmeasured} results were never evaluated."));
         }
@@ -294,6 +317,7 @@ struct SeriesKey<'a> {
     dual: &'a str,
     samples: usize,
     threads: Option<usize>,
+    edition: Option<&'a str>,
 }
 
 impl<'a> SeriesKey<'a> {
@@ -323,6 +347,7 @@ impl<'a> SeriesKey<'a> {
             dual: conditions.map_or("", |c| &c.dual),
             samples: conditions.map_or(0, |c| c.samples),
             threads: simplify.threads,
+            edition: record.edition.as_deref(),
         }
     }
 
@@ -352,7 +377,8 @@ fn series_labels(keys: &[SeriesKey<'_>]) -> Vec<String> {
 
 impl SeriesKey<'_> {
     fn name(&self) -> String {
-        self.variant.map_or_else(|| self.method_and_params(), str::to_owned)
+        let name = self.variant.map_or_else(|| self.method_and_params(), str::to_owned);
+        self.edition.map_or(name.clone(), |edition| format!("{name} ({edition})"))
     }
 
     fn method_and_params(&self) -> String {

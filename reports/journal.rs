@@ -154,7 +154,7 @@ pub(crate) fn replace_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
 
 /// One line with its line break. JSON has no infinity and no NaN and serde writes `null` for
 /// them, which no reader accepts: such a record is rejected here.
-fn to_line(record: &Record) -> Result<String, JournalError> {
+pub(crate) fn to_line(record: &Record) -> Result<String, JournalError> {
     let written = serde_json::to_string(record).and_then(|line| {
         let back: Record = serde_json::from_str(&line)?;
         Ok((line, back == *record))

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `record` | [`Record`], one line of `results.jsonl` |
 //! | `journal` | reading and appending those lines |
+//! | [`editions`] | frozen results that others compare against |
 //! | [`diff`] | an older and a newer set of records, and the regressions between them |
 //! | `comparison` | records arranged by mesh, method and level |
 //! | `metric` | the columns: name, unit, direction, definition |
@@ -22,6 +23,7 @@
 mod answers;
 mod comparison;
 pub mod diff;
+pub mod editions;
 mod header;
 pub mod history;
 mod journal;

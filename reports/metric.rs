@@ -308,6 +308,16 @@ pub(crate) const TOTAL_SECONDS: Metric = Metric::new(
          included.",
 );
 
+/// The seconds of an edition, in a column of their own next to [`TOTAL_SECONDS`]; in no other table or plot.
+pub(crate) const FROZEN_SECONDS: Metric = Metric::new(
+    "frozen_seconds_total",
+    "frozen time",
+    "s",
+    (Better::Lower, Digits::Significant, GEOMETRIC),
+    Value::Record(|record| Some(record.frozen_seconds()?.total)),
+)
+.neutral();
+
 /// The columns of the comparison tables.
 pub(crate) const COMPARED: [&Metric; 8] = [
     &HAUSDORFF,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::answers::{by_bound, equal_error_table, usual_level};
 use crate::comparison::{Comparison, RISING, RISING_NOTE, reached, row_name};
 use crate::header::MethodNote;
-use crate::metric::{HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
+use crate::metric::{FROZEN_SECONDS, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
 use crate::record::Record;
 use crate::summary::{CountSummary, SeriesSummary, by_count};
 use crate::tables::{Cell, Table};
@@ -57,6 +57,7 @@ pub(crate) fn overview_table(
         .text("topology", |row| Cell::share(row.topology))
         .number("means over", |row| Cell::share((row.over, row.requested)))
         .number("seconds", |row| mean(row, &TOTAL_SECONDS))
+        .number("frozen s", |row| mean(row, &FROZEN_SECONDS))
         .text("best suited for", |row| {
             let note = methods.iter().find(|note| note.id == comparison.methods[row.series]);
             note.and_then(MethodNote::briefly).unwrap_or_default()
@@ -71,11 +72,14 @@ pub(crate) fn overview_table(
     }
     let has_rising = rows.iter().any(|row| row.rising);
     notes.extend(has_rising.then(|| RISING_NOTE.to_owned()));
+    let edition = comparison.edition_note();
+    let table = if edition.is_some() { table } else { table.without(&["frozen s"]) };
     let missing: Vec<String> =
         missing.iter().map(|(why, names)| format!("{}: {why}", names.join(", "))).collect();
     if !missing.is_empty() {
         notes.push(format!("No result at this count: {}.", missing.join("; ")));
     }
+    notes.extend(edition);
     let table = if is_one { table.of_one_mesh() } else { table };
     let meshes = counted(comparison.meshes.len(), "mesh", "meshes");
     let caption = format!("{}, {meshes}", counted(count, "sphere", "spheres"));

@@ -182,6 +182,9 @@ pub struct Record {
     /// Path of the resulting `.ma` file relative to the folder of the results, with `/`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub artifact: Option<String>,
+    /// The edition that holds this record, where it is a frozen one next to those of a store.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub edition: Option<String>,
 }
 
 impl Record {
@@ -190,9 +193,15 @@ impl Record {
         self.conditions.as_ref().is_none_or(|conditions| conditions.jobs <= 1)
     }
 
-    /// Wall-clock seconds by stage, of a run that nothing disturbed.
+    /// Wall-clock seconds by stage, of a run that nothing disturbed. Those of an edition are of another run, on another
+    /// machine in general: [`Self::frozen_seconds`].
     pub(crate) fn seconds(&self) -> Option<Stages> {
-        self.simplify.seconds.filter(|_| self.ran_alone())
+        self.simplify.seconds.filter(|_| self.ran_alone() && self.edition.is_none())
+    }
+
+    /// Wall-clock seconds by stage, of a record of an edition.
+    pub(crate) fn frozen_seconds(&self) -> Option<Stages> {
+        self.simplify.seconds.filter(|_| self.ran_alone() && self.edition.is_some())
     }
 }
 

@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::comparison::{Comparison, Entry, RISING, RISING_NOTE, level_label, reached};
 use crate::header::Header;
-use crate::metric::{COMPARED, GEOMETRIC, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
+use crate::metric::{GEOMETRIC, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
 use crate::record::{Record, Status, Target};
 use crate::tables::{Cell, Table};
 use crate::text::{counted, grouped, significant, trimmed};
@@ -40,7 +40,7 @@ pub(crate) struct SeriesSummary {
     pub(crate) requested: usize,
     /// Meshes without such a result, by status.
     pub(crate) without: BTreeMap<Status, usize>,
-    /// Means of [`COMPARED`] by their keys, and the number of meshes that each is over.
+    /// Means of the columns by their keys, and the number of meshes that each is over.
     means: BTreeMap<&'static str, (f64, usize)>,
     /// Hausdorff error in relation to the reference's.
     pub(crate) ratio: Option<Ratio>,
@@ -92,9 +92,11 @@ impl CountSummary {
 /// The series that others are put in relation to: Q-MAT as it is by default, or else the first
 /// series that reached a count.
 pub(crate) fn reference(comparison: &Comparison<'_>) -> Option<usize> {
-    // Every series has an entry: its label comes from a record.
+    // Every series has an entry: its label comes from a record. That of an edition has its name in parentheses.
     let plain = comparison.series.iter().position(|label| label == REFERENCE);
-    plain.or_else(|| {
+    let frozen =
+        || comparison.series.iter().position(|label| label.split(" (").next() == Some(REFERENCE));
+    plain.or_else(frozen).or_else(|| {
         comparison.entries.iter().filter(|e| e.comparable()).map(|entry| entry.series).min()
     })
 }
@@ -184,7 +186,7 @@ fn at_count(
             set.levels.contains(&level) && entry.comparable() && set.meshes.contains(&entry.mesh)
         });
         let mut means = BTreeMap::new();
-        for metric in COMPARED {
+        for metric in comparison.columns() {
             let known = set.known(comparison, series, metric);
             let values = averaged.iter().filter(|entry| known.contains(&entry.mesh));
             let values: Vec<f64> = values.filter_map(|entry| metric.of(entry.record)).collect();
@@ -265,7 +267,8 @@ pub(crate) struct NativePoint {
     pub(crate) spheres: f64,
     pub(crate) hausdorff: f64,
     pub(crate) mean: f64,
-    pub(crate) seconds: f64,
+    /// Unknown for an edition, and where items disturbed each other.
+    pub(crate) seconds: Option<f64>,
     /// Results with the solid's Betti numbers, of those where both are known.
     pub(crate) topology: (usize, usize),
 }
@@ -297,7 +300,7 @@ fn native_point(level: Target, entries: &[&Entry<'_>]) -> Option<NativePoint> {
         spheres: mean_of(entries, |record| Some(reached(record)? as f64))?,
         hausdorff: mean_of(entries, |record| HAUSDORFF.of(record))?,
         mean: mean_of(entries, |record| MEAN_ERROR.of(record))?,
-        seconds: mean_of(entries, |record| TOTAL_SECONDS.of(record))?,
+        seconds: mean_of(entries, |record| TOTAL_SECONDS.of(record)),
         topology: topology(entries),
     })
 }
@@ -332,7 +335,9 @@ pub(crate) fn native_table(
         .number("spheres", |(_, point)| grouped(point.spheres.round() as u64))
         .number(HAUSDORFF.heading(), |(_, point)| significant(point.hausdorff, 3))
         .number(MEAN_ERROR.heading(), |(_, point)| significant(point.mean, 3))
-        .number("total (s)", |(_, point)| significant(point.seconds, 3))
+        .number("total (s)", |(_, point)| {
+            Cell::optional(point.seconds.map(|seconds| significant(seconds, 3)))
+        })
         .text("topology right", |(_, point)| Cell::share(point.topology));
     let note = "Geometric means over one set of meshes for each method: those with a result at all \
          its levels. The level is the method's own scalar, with its name and unit. Spheres are \
@@ -372,7 +377,7 @@ pub(crate) fn means_table(
             Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes")))
         });
     let rising_note = places.iter().any(|(_, row)| row.rising).then_some(RISING_NOTE);
-    for metric in COMPARED {
+    for metric in comparison.columns() {
         rows = rows.number(metric.heading(), |(summary, row)| {
             let mut cell = mean_cell(summary, row, metric);
             let rises = metric.key == HAUSDORFF.key && row.rising;
@@ -396,7 +401,9 @@ pub(crate) fn means_table(
     ];
     Table {
         caption: MEANS.to_owned(),
-        notes: notes.into_iter().chain(rising_note).map(str::to_owned).collect(),
+        notes: (notes.into_iter().chain(rising_note).map(str::to_owned))
+            .chain(comparison.edition_note())
+            .collect(),
         grouped: true,
         ..rows.table
     }

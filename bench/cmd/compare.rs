@@ -1,6 +1,6 @@
 //! `medial compare [MESH ...]`: the main job. Methods x meshes x levels, measured and reported.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -15,8 +15,9 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_line};
 use crate::provenance::Provenance;
-use crate::rebuild::{Rebuilt, RunReport, write_study};
+use crate::rebuild::{Rebuilt, RunReport, STUDY, of_items, write_study};
 use crate::store::{AXES, PAGE, RESULTS, Store};
+use crate::study::edition::{Edition, Mixed};
 use crate::study::external::{ExternalResult, GIVEN};
 use crate::study::item::{Item, Keep};
 use crate::study::registry::Registry;
@@ -66,6 +67,10 @@ pub struct Arguments {
     /// `--spheres`.
     #[arg(long, value_name = "NAME=PATH")]
     given: Vec<String>,
+    /// Show the frozen results of an edition next to the own ones without running its methods: a name such as
+    /// `2027.1`, or a folder.
+    #[arg(long, value_name = "EDITION")]
+    against: Option<PathBuf>,
     /// Time each item N times, alternating between methods, and report the median [default: 1].
     #[arg(long, value_name = "N")]
     repeat: Option<usize>,
@@ -127,6 +132,8 @@ pub fn run(
     arguments.apply_to_methods(&mut study, registry)?;
     let provenance = Provenance::here();
     let mut items = study.items(registry, &provenance)?;
+    let edition = Edition::of(&study)?;
+    edition.iter().try_for_each(|edition| edition.check(&study, &items))?;
     if let Some(text) = &arguments.shard {
         items = shard(text, &items)?;
     }
@@ -149,7 +156,9 @@ pub fn run(
     if arguments.fresh {
         side.store.clear(RESULTS)?;
     }
-    if !left.is_empty() {
+    let earlier = Study::read(&arguments.out.join(STUDY)).ok();
+    let turns = earlier.is_some_and(|earlier| earlier.against != study.against);
+    if !left.is_empty() || turns {
         write_study(&arguments.out, &study)?;
     }
     // Mesh by mesh from cheap to expensive, so that first results come soon.
@@ -161,7 +170,7 @@ pub fn run(
     }
     let levels: usize = left.iter().map(|item| item.levels.len()).sum();
     let (dir, registry) = (&arguments.out, &*registry);
-    let adds = levels > 0;
+    let adds = levels > 0 || turns;
     let report = RunReport { dir, registry, provenance: &provenance, items: &items, adds };
     let due = PAUSES.map(|pause| Instant::now() + pause);
     let running = Running { total: methods_of(&items).len(), ..Running::default() };
@@ -195,7 +204,8 @@ pub fn run(
     let earlier: Vec<Record> =
         records.iter().filter(|record| !shown.contains(&record.key)).cloned().collect();
     reasons(&earlier).iter().for_each(|reason| print_error(reason));
-    finish(&records, [run, found], arguments, &files, global)
+    let shown = edition.map(|edition| edition.beside(&study, &records));
+    finish(&records, shown, [run, found], arguments, &files, global)
 }
 
 /// The methods of some items, each once.
@@ -246,6 +256,10 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
         study.dataset.clear();
     }
     replace(&mut study.dataset, &arguments.dataset);
+    // A folder: names of editions stay.
+    let against = arguments.against.as_ref();
+    let against = against.map(|path| if path.is_dir() { absolute(path) } else { path.clone() });
+    study.against = against.or(study.against);
     if !arguments.methods.is_empty() {
         let methods = arguments.methods.iter().map(|text| StudyMethod::parse(text));
         study.methods = methods.collect::<Result<_, _>>()?;
@@ -342,17 +356,10 @@ fn named<'s>(
     Ok(rows)
 }
 
-/// The records of some items, in the order of the items.
-fn of_items(records: Vec<Record>, items: &[Item]) -> Vec<Record> {
-    // The last record of a key counts.
-    let mut by_key: HashMap<String, Record> =
-        records.into_iter().map(|record| (record.key.clone(), record)).collect();
-    items.iter().flat_map(Item::keys).filter_map(|key| by_key.remove(&key)).collect()
-}
-
 /// Prints the summary and decides the exit code.
 fn finish(
     records: &[Record],
+    mixed: Option<Mixed>,
     [run, found]: [usize; 2],
     arguments: &Arguments,
     files: &[PathBuf],
@@ -361,6 +368,10 @@ fn finish(
     let ok = records.iter().filter(|record| record.status.is_ok()).count();
     let out = &arguments.out;
     let page = out.join(PAGE);
+    let (shown, notes) = match &mixed {
+        Some(mixed) => (&mixed.records[..], &mixed.notes[..]),
+        None => (records, &[][..]),
+    };
     if global.json {
         let by_status: serde_json::Map<String, serde_json::Value> =
             Status::ALL.iter().map(|&s| (s.key().to_owned(), count(records, s).into())).collect();
@@ -368,12 +379,13 @@ fn finish(
             "out": out, "records": records.len(), "run": run, "found": found,
             "status": by_status, "results": out.join(RESULTS), "page": page, "files": files,
         });
-        print_json(&object, &[]);
+        print_json(&object, notes);
     } else {
         if ok > 0 {
             let methods = read_header(out).unwrap_or_default().methods;
-            print_line(&medial_reports::summary_text(records, &methods));
+            print_line(&medial_reports::summary_text(shown, &methods));
         }
+        notes.iter().for_each(|note| print_line(note));
         let external = match count(records, Status::External) {
             0 => String::new(),
             files => format!(" ({files} external)"),

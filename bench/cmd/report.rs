@@ -1,23 +1,26 @@
 //! `medial report DIR [DIR ...] [--out DIR]`: rebuilds tables, plots and page from the records of a store, or of
 //! several stores that it merges.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use clap::Args;
-use medial_reports::{Header, Record, read_header, write_records};
+use medial::metrics::DEFINITIONS;
+use medial_reports::{Header, Record, Target, editions, read_header, write_records};
 use serde_json::json;
 
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::files;
 use crate::output::{print_json, print_line};
-use crate::rebuild::{Rebuilt, STUDY, rebuild, records, write_study};
+use crate::provenance::{Provenance, hex_digest};
+use crate::rebuild::{Rebuilt, STUDY, of_items, rebuild, records, write_study};
 use crate::store::{PAGE, RESULTS, Store, artifact_path};
-use crate::study::Study;
+use crate::study::edition::{Description, EditionMesh};
 use crate::study::registry::Registry;
+use crate::study::{Study, VOLUME_DEPTH, unique_names};
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]
@@ -28,6 +31,10 @@ pub struct Arguments {
     /// Merge the stores into this folder; required for several stores.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Also write the results of the store's study as an edition for `compare --against` into this folder, which names
+    /// the edition.
+    #[arg(long, value_name = "DIR")]
+    freeze: Option<PathBuf>,
 }
 
 /// Runs the verb.
@@ -49,6 +56,9 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let Rebuilt { records, files, mut warnings, undrawn } = rebuild(dir, registry)?;
     warnings.extend(undrawn);
     warnings.extend(notes);
+    if let Some(edition) = &arguments.freeze {
+        freeze(dir, &records, edition, registry)?;
+    }
     drop(held);
     if global.json {
         print_json(&json!({ "records": records.len(), "files": files }), &warnings);
@@ -165,6 +175,106 @@ fn merge(dirs: &[PathBuf], out: &Path) -> Result<Vec<String>, Failure> {
     files::write(&out.join("header.json"), &text)?;
     drop(store);
     Ok(notes)
+}
+
+/// Results of an edition that are kept as medial meshes, to be measured again by later builds.
+const KEPT: usize = 5;
+
+/// Writes the records of the study of a store as an edition.
+fn freeze(dir: &Path, records: &[Record], to: &Path, registry: &Registry) -> Result<(), Failure> {
+    let here = Provenance::here();
+    let study = Study::read(&dir.join(STUDY))?;
+    let items = study.items(registry, &here)?;
+    let mut frozen = of_items(records.to_vec(), &items);
+    let all: usize = items.iter().map(|item| item.levels.len()).sum();
+    let fault = if frozen.len() < all {
+        let missing = all - frozen.len();
+        Some(format!(
+            "{missing} of {all} results are missing or of another build; run `medial compare` again"
+        ))
+    } else if items
+        .iter()
+        .any(|item| item.scene.noise.is_some() || item.method.fingerprint.is_some())
+    {
+        Some("its study has noise or plug-ins, which an edition cannot hold".to_owned())
+    } else {
+        None
+    };
+    if let Some(fault) = fault {
+        return Err(Failure::at(dir, fault));
+    }
+    let sources = study.sources()?;
+    let mesh = unique_names(&sources).into_iter().zip(&sources).map(|(name, source)| {
+        let item = items.iter().find(|item| item.scene.mesh == name);
+        let sha256 = item.and_then(|item| item.scene.hash.clone()).unwrap_or_default();
+        EditionMesh { name, source: source.to_string(), sha256 }
+    });
+    let mesh: Vec<EditionMesh> = mesh.collect();
+    let mut native: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    for item in &items {
+        let levels = native.entry(item.method.label().to_owned()).or_default();
+        for level in &item.levels {
+            if let Target::Native(level) = level
+                && !levels.contains(level)
+            {
+                levels.push(*level);
+            }
+        }
+    }
+    native.retain(|_, levels| !levels.is_empty());
+    // Of the first meshes one result of few spheres each, of one method after the other.
+    let coarsest = study.spheres.iter().min().copied().unwrap_or(0);
+    let mut kept = vec![];
+    for (k, mesh) in mesh.iter().take(KEPT).enumerate() {
+        let own = frozen.iter().filter(|record| {
+            let is_coarsest = record.simplify.level == Target::Spheres(coarsest);
+            record.mesh == mesh.name && is_coarsest && record.artifact.is_some()
+        });
+        let own: Vec<&str> = own.filter_map(|record| record.artifact.as_deref()).collect();
+        kept.extend(own.get(3 * k % own.len().max(1)).map(|&artifact| artifact.to_owned()));
+    }
+    for record in &mut frozen {
+        // Without what only the store needs.
+        record.key.clear();
+        record.command.clear();
+        record.repetitions.clear();
+        record.evaluate_seconds = None;
+        record.artifact = record.artifact.take().filter(|artifact| kept.contains(artifact));
+    }
+    let machines: BTreeSet<String> = frozen.iter().map(|r| r.machine.to_string()).collect();
+    let packed = editions::pack(&frozen).map_err(Failure::input)?;
+    let mut spheres = study.spheres;
+    spheres.sort_unstable_by(|a, b| b.cmp(a));
+    let name = to.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let description = Description {
+        name,
+        metrics: DEFINITIONS,
+        version: here.version,
+        samples: study.samples,
+        volume_depth: VOLUME_DEPTH,
+        seed: study.seed,
+        sampling: study.sampling,
+        dual: study.dual,
+        certify: study.certify,
+        spheres,
+        max_error: study.max_error,
+        records: frozen.len(),
+        sha256: hex_digest(&packed),
+        machines: machines.into_iter().collect(),
+        native,
+        mesh,
+    };
+    let text = toml::to_string(&description).map_err(|error| Failure::at(to, error))?;
+    for artifact in &kept {
+        let [from, target] = [dir, to].map(|folder| folder.join(artifact));
+        let bytes = fs::read(&from).map_err(|error| Failure::at(&from, error))?;
+        fs::create_dir_all(target.parent().unwrap_or(to))
+            .map_err(|error| Failure::at(to, error))?;
+        files::write(&target, &bytes)?;
+    }
+    fs::create_dir_all(to).map_err(|error| Failure::at(to, error))?;
+    files::write(&to.join(editions::RECORDS), &packed)?;
+    files::write(&to.join(editions::DESCRIPTION), text.as_bytes())
 }
 
 /// Whether two records of one key hold the same result and the same measures.

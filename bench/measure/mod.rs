@@ -254,6 +254,7 @@ pub fn failure_record(
         command: provenance.command.clone(),
         version: provenance.version.clone(),
         artifact: None,
+        edition: None,
     }
 }
 

@@ -15,10 +15,19 @@ use crate::files;
 use crate::provenance::Provenance;
 use crate::store::{PAGE, RESULTS};
 use crate::study::Study;
+use crate::study::edition::Edition;
 use crate::study::item::Item;
 use crate::study::registry::Registry;
 
 mod pictures;
+
+/// The records of some items, in the order of the items.
+pub fn of_items(records: Vec<Record>, items: &[Item]) -> Vec<Record> {
+    // The last record of a key counts.
+    let mut by_key: HashMap<String, Record> =
+        records.into_iter().map(|record| (record.key.clone(), record)).collect();
+    items.iter().flat_map(Item::keys).filter_map(|key| by_key.remove(&key)).collect()
+}
 
 /// Name of the file with the last requested study.
 pub const STUDY: &str = "study.toml";
@@ -106,14 +115,26 @@ fn write(
     // Tables follow the order of the records: that of the study, not that of the runs.
     let order = positions(items);
     records.sort_by_key(|record| order.get(&row_of(record)).copied().unwrap_or(usize::MAX));
+    let study = Study::read(&dir.join(STUDY)).ok();
+    let mut header = header.clone();
+    let mixed = study.and_then(|study| match Edition::of(&study) {
+        Ok(edition) => Some(edition?.beside(&study, &records)),
+        // The own results do not depend on it.
+        Err(error) => {
+            header.notes.push(error.to_string());
+            None
+        }
+    });
+    header.notes.extend(mixed.iter().flat_map(|mixed| mixed.notes.clone()));
+    let shown = mixed.map_or_else(|| records.clone(), |mixed| mixed.records);
     let mut undrawn = Vec::new();
     if draws {
         // Pictures of inputs that can no longer be read stay unchanged.
         let study = Study::read(&dir.join(STUDY)).ok();
         let sources = study.and_then(|study| study.sources().ok()).unwrap_or_default();
-        undrawn = pictures::draw(dir, &records, &sources);
+        undrawn = pictures::draw(dir, &shown, &sources);
     }
-    let files = write_report(dir, &records, header).map_err(Failure::input)?;
+    let files = write_report(dir, &shown, &header).map_err(Failure::input)?;
     Ok(Rebuilt { records, files, warnings, undrawn })
 }
 

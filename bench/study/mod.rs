@@ -5,10 +5,12 @@
 //! | `mod` | [`Study`], the content of a study file; its items and shards |
 //! | `item` | [`Item`], all that decides a record, and its keys |
 //! | `source` | the origins of meshes |
+//! | `edition` | frozen results to compare against |
 //! | `library` | published meshes by name |
 //! | `external` | results computed elsewhere |
 //! | `registry` | the methods by id |
 
+pub mod edition;
 pub mod external;
 pub mod item;
 pub mod library;
@@ -103,6 +105,9 @@ pub struct Study {
     pub memory: Option<u64>,
     /// Which results stay on disk.
     pub keep: Keep,
+    /// The edition, by name or folder, whose results the report has next to its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub against: Option<PathBuf>,
     /// Plug-in files.
     pub plugins: Vec<PathBuf>,
     /// Further methods that start from the output of each filter.
@@ -175,6 +180,7 @@ impl Default for Study {
             jobs: 1,
             memory: None,
             keep: Keep::default(),
+            against: None,
             plugins: vec![],
             after_filters: vec![],
             methods: vec![],
@@ -225,7 +231,8 @@ impl Study {
     pub fn check(&self) -> Result<(), StudyError> {
         let counts = self.methods.iter().filter_map(|method| method.spheres.as_ref());
         let mut paths = (self.meshes.iter().chain(&self.plugins).chain(&self.folder))
-            .chain(self.given.iter().map(|given| &given.file));
+            .chain(self.given.iter().map(|given| &given.file))
+            .chain(&self.against);
         let fault = if !(1..=MOST_REPEATS).contains(&self.repeat) {
             format!("--repeat {}: expected a number from 1 to {MOST_REPEATS}", self.repeat)
         } else if !(1..=MOST_SAMPLES).contains(&self.samples) {

@@ -171,7 +171,7 @@ impl Page<'_> {
             let (colour, symbol, hollow) = symbol(index);
             json!({"name": name, "colour": colour, "symbol": symbol, "hollow": hollow})
         });
-        let metrics = COMPARED.iter().map(|metric| {
+        let metrics = comparison.columns().into_iter().map(|metric| {
             // Hidden at first, so that the table fits a screen.
             let rare = [&EPSILON, &SPHERES_ONLY, &BELOW_30].iter().any(|rare| rare.key == metric.key);
             json!({"key": metric.key, "title": metric.heading(), "digits": metric.digits, "shown": !rare})
@@ -201,7 +201,10 @@ impl Page<'_> {
             "study": header.study,
             "running": header.running,
             "alert": self.alert(),
-            "notices": header.notes.iter().cloned().chain(comparison.cautions()).collect::<Vec<_>>(),
+            "notices": (comparison.edition_note().into_iter())
+                .chain(header.notes.iter().cloned())
+                .chain(comparison.cautions())
+                .collect::<Vec<_>>(),
             "series": series.collect::<Vec<_>>(),
             "levels": comparison.levels.iter().map(|&level| level_label(level)).collect::<Vec<_>>(),
             "metrics": metrics.collect::<Vec<_>>(),

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, Entry, level_label, reached};
-use crate::metric::COMPARED;
 use crate::record::{Record, Target};
 use crate::tables::{Best, flatten, remark, topology_word, warnings};
 use crate::text::significant;
@@ -44,7 +43,7 @@ fn row(comparison: &Comparison<'_>, entry: &Entry<'_>, best: &Best) -> Vec<(Stri
         _ => None,
     };
     let mut bits = 0_u32;
-    for (bit, metric) in COMPARED.iter().enumerate() {
+    for (bit, metric) in comparison.columns().into_iter().enumerate() {
         let Some(value) = metric.of(record) else { continue };
         let rounded: f64 = significant(value, 5).parse().unwrap_or(value);
         row.push((format!("table/{}", metric.key), json!(rounded)));

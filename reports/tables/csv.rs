@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, Entry};
-use crate::metric::{METRICS, Value as Place};
+use crate::metric::{FROZEN_SECONDS, METRICS, Value as Place};
 use crate::record::{Record, Target};
 use crate::text::printable;
 
@@ -64,7 +64,8 @@ pub(crate) fn flatten(record: &Record) -> Vec<(String, Value)> {
             descend(if is_part { key } else { format!("item/{key}") }, value, &mut values);
         }
     }
-    if !record.ran_alone() {
+    // Those of an edition are `frozen_seconds_total`.
+    if !record.ran_alone() || record.edition.is_some() {
         let timed = ["simplify/seconds", "simplify/cpu_seconds", "simplify/substrates"];
         values.retain(|(path, _)| !timed.iter().any(|part| path.starts_with(part)));
         values.retain(|(path, _)| path != "item/repetitions");
@@ -139,6 +140,9 @@ fn row(entry: &Entry<'_>) -> BTreeMap<String, String> {
             NAMES.iter().find_map(|(start, name)| Some((name, path.strip_prefix(start)?)));
         let (start, rest) = renamed.unwrap_or((&"", &path));
         add(format!("{start}{}", rest.replace('/', "_")), &value, &mut row);
+    }
+    if let Some(seconds) = record.frozen_seconds() {
+        row.insert(FROZEN_SECONDS.key.to_owned(), seconds.total.to_string());
     }
     // Some are computed from others.
     for metric in METRICS {

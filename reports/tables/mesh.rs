@@ -76,7 +76,7 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
         .number("spheres", |entry| {
             Cell::optional(reached(entry.record).map(|count| grouped(count as u64)))
         });
-    for metric in COMPARED {
+    for metric in comparison.columns() {
         rows = rows.number(metric.heading(), |entry| match metric.of(entry.record) {
             Some(value) => {
                 let mark = if metric.key == HAUSDORFF.key && comparison.is_rising(entry) {
@@ -111,6 +111,7 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
     if entries.iter().any(|entry| comparison.is_rising(entry)) {
         notes.push(RISING_NOTE.to_owned());
     }
+    notes.extend(comparison.edition_note());
     Table {
         caption: format!("{}: every method at every level", comparison.meshes[mesh]),
         notes,

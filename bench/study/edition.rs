@@ -1,0 +1,340 @@
+//! Editions: frozen results that new ones are compared against, without a run of their methods.
+//!
+//! An edition is known by its name if it is part of the program, or by its folder. Its rows are matched by the hash of the
+//! mesh, not by its name, and by the level. Everything that decides a measured number must be the study's: the samples,
+//! the seed, the sampling of the start, and the version of the metrics' definitions.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use medial::metrics::DEFINITIONS;
+use medial::surface::Sampling;
+use medial_reports::editions::{DESCRIPTION, EDITIONS, Embedded, RECORDS, unpack};
+use medial_reports::{Record, Target, check_regular};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use crate::provenance::hex_digest;
+use crate::study::item::{Dual, Item};
+use crate::study::registry::INITIAL;
+use crate::study::source::did_you_mean;
+use crate::study::{Study, VOLUME_DEPTH};
+
+/// The description of an edition: `edition.toml`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Description {
+    /// Name, that of its folder.
+    pub name: String,
+    /// Version of the definitions of the metrics.
+    pub metrics: u32,
+    /// Version of the program.
+    pub version: String,
+    /// Surface samples of the evaluation.
+    pub samples: usize,
+    /// Levels of division of space for the volume difference.
+    pub volume_depth: u32,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// Boundary samples of the start of all methods.
+    pub sampling: Sampling,
+    /// Triangulation of the dual Voronoi polygons.
+    pub dual: Dual,
+    /// Width of the certified intervals, a fraction of the diagonal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certify: Option<f64>,
+    /// Sphere counts.
+    pub spheres: Vec<usize>,
+    /// Error bounds, fractions of the diagonal.
+    pub max_error: Vec<f64>,
+    /// Number of records.
+    pub records: usize,
+    /// SHA-256 of the packed records.
+    pub sha256: String,
+    /// The machines of the seconds.
+    pub machines: Vec<String>,
+    /// Native levels of each method.
+    pub native: BTreeMap<String, Vec<f64>>,
+    /// The meshes.
+    pub mesh: Vec<EditionMesh>,
+}
+
+/// A mesh of an edition.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EditionMesh {
+    /// Name in the tables of the edition.
+    pub name: String,
+    /// Its argument on the command line; `medial datasets fetch` fetches `dataset:NAME`.
+    pub source: String,
+    /// SHA-256 of its file; of a built-in shape its surface and known axis.
+    pub sha256: String,
+}
+
+/// The reason for which an edition cannot be compared with a study.
+#[derive(Debug, thiserror::Error)]
+pub enum EditionError {
+    /// Neither a name of an edition nor a folder.
+    #[error("--against {name}: unknown edition{meant} (expected a folder or one of: {known})")]
+    Unknown {
+        /// The name.
+        name: String,
+        /// A similar name, as a question.
+        meant: String,
+        /// The names of all editions.
+        known: String,
+    },
+    /// A file cannot be read, or is not what its name says.
+    #[error("{}: {message}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The problem.
+        message: String,
+    },
+    /// The records are not those that the description names.
+    #[error(
+        "edition {name}: the records have changed (SHA-256 {found}, expected {expected}); restore {RECORDS}"
+    )]
+    Changed {
+        /// The edition.
+        name: String,
+        /// Hash of the records.
+        found: String,
+        /// Hash in the description.
+        expected: String,
+    },
+    /// Its numbers have other definitions.
+    #[error(
+        "edition {name}: measured by version {edition} of the metrics (this program has version {DEFINITIONS}); \
+         choose another edition"
+    )]
+    Definitions {
+        /// The edition.
+        name: String,
+        /// Version of its metrics.
+        edition: u32,
+    },
+    /// The study measures in another way.
+    #[error(
+        "--{option} {found}: edition {name} was measured with {expected}, so the results do not compare; \
+         omit --{option} or --against"
+    )]
+    Settings {
+        /// The edition.
+        name: String,
+        /// The option.
+        option: &'static str,
+        /// Its value in the study.
+        found: String,
+        /// Its value in the edition.
+        expected: String,
+    },
+    /// No mesh in common.
+    #[error(
+        "--against {name}: no mesh of this comparison is in the edition (expected one of: {known})"
+    )]
+    NoMesh {
+        /// The edition.
+        name: String,
+        /// Its meshes.
+        known: String,
+    },
+}
+
+/// An edition whose records are those of its description.
+#[derive(Debug)]
+pub struct Edition {
+    /// The description.
+    pub description: Description,
+    records: Vec<Record>,
+}
+
+/// The records of a comparison together with those of an edition.
+pub struct Mixed {
+    /// The comparison's own, then those of the edition.
+    pub records: Vec<Record>,
+    /// Sentences on what was left out.
+    pub notes: Vec<String>,
+}
+
+impl Edition {
+    /// The edition of a study, if it has one.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn of(study: &Study) -> Result<Option<Self>, EditionError> {
+        let is_known = |name: &Path| EDITIONS.iter().any(|known| Path::new(known.name) == name);
+        let name = study.against.as_ref();
+        let name =
+            name.map(|name| if is_known(name) { name.clone() } else { study.resolved(name) });
+        name.as_deref().map(Self::open).transpose()
+    }
+
+    /// Opens an edition by its name or folder.
+    ///
+    /// # Errors
+    /// Unless it is known, unaltered, and measured by the definitions of this program.
+    pub fn open(name: &Path) -> Result<Self, EditionError> {
+        let embedded = EDITIONS.iter().find(|edition| Path::new(edition.name) == name);
+        let file = |of: &str| embedded.map_or_else(|| name.join(of), |_| PathBuf::from(of));
+        let failed = |of: &str, message: String| EditionError::File { path: file(of), message };
+        let (text, packed) = match embedded {
+            Some(Embedded { description, records, .. }) => {
+                ((*description).to_owned(), records.to_vec())
+            }
+            None if !name.is_dir() => {
+                let known: Vec<&str> = EDITIONS.iter().map(|edition| edition.name).collect();
+                let name = name.display().to_string();
+                let meant = did_you_mean(&name, known.iter().copied());
+                return Err(EditionError::Unknown { name, meant, known: known.join(", ") });
+            }
+            None => {
+                let read = |of: &str| {
+                    let path = name.join(of);
+                    let bytes = check_regular(&path).and_then(|()| fs::read(path));
+                    bytes.map_err(|error| failed(of, error.to_string()))
+                };
+                let text = String::from_utf8(read(DESCRIPTION)?);
+                let text = text.map_err(|error| failed(DESCRIPTION, error.to_string()))?;
+                (text, read(RECORDS)?)
+            }
+        };
+        let wrong = |error: toml::de::Error| failed(DESCRIPTION, error.to_string());
+        let description: Description = toml::from_str(&text).map_err(wrong)?;
+        let (name, found) = (description.name.clone(), hex_digest(&packed));
+        if found != description.sha256 {
+            let expected = description.sha256;
+            return Err(EditionError::Changed { name, found, expected });
+        }
+        if description.metrics != DEFINITIONS {
+            return Err(EditionError::Definitions { name, edition: description.metrics });
+        }
+        let unpacked = unpack(&packed).map_err(|error| failed(RECORDS, error.to_string()))?;
+        if let Some(line) = unpacked.bad_lines.first() {
+            return Err(failed(RECORDS, line.to_string()));
+        }
+        Ok(Self { description, records: unpacked.records })
+    }
+
+    /// Refuses a study whose results do not compare with those of the edition, before any run.
+    ///
+    /// # Errors
+    /// For the first option that differs, and without a common mesh.
+    pub fn check(&self, study: &Study, items: &[Item]) -> Result<(), EditionError> {
+        let Description { samples, volume_depth, seed, sampling, dual, .. } = &self.description;
+        let settings = [
+            ("samples", study.samples.to_string(), samples.to_string()),
+            ("volume-depth", VOLUME_DEPTH.to_string(), volume_depth.to_string()),
+            ("seed", study.seed.to_string(), seed.to_string()),
+            ("sampling", study.sampling.to_string(), sampling.to_string()),
+            ("dual", study.dual.to_string(), dual.to_string()),
+        ];
+        let name = self.description.name.clone();
+        for (option, found, expected) in settings {
+            if found != expected {
+                return Err(EditionError::Settings { name, option, found, expected });
+            }
+        }
+        let meshes = &self.description.mesh;
+        let hashes = items.iter().filter_map(|item| item.scene.hash.as_ref());
+        match hashes.into_iter().any(|hash| meshes.iter().any(|mesh| mesh.sha256 == *hash)) {
+            true => Ok(()),
+            false => {
+                let known: Vec<&str> = meshes.iter().map(|mesh| mesh.source.as_str()).collect();
+                Err(EditionError::NoMesh { name, known: known.join(", ") })
+            }
+        }
+    }
+
+    /// The records of a comparison on meshes of the edition, and the edition's on these meshes at the levels of the study.
+    /// A method that gives the same results in both has its own rows alone.
+    pub fn beside(&self, study: &Study, own: &[Record]) -> Mixed {
+        let edition = &self.description;
+        // The shortest name of a mesh: noise adds to it, and is not part of the hash.
+        let mut names: BTreeMap<&str, &str> = BTreeMap::new();
+        for record in own {
+            let hash = record.mesh_hash.as_deref().unwrap_or_default();
+            if edition.mesh.iter().any(|mesh| mesh.sha256 == hash) {
+                let name = names.entry(hash).or_insert(&record.mesh);
+                *name = if record.mesh.len() < name.len() { &record.mesh } else { *name };
+            }
+        }
+        let is_in = |record: &Record| {
+            let hash = record.mesh_hash.as_deref().unwrap_or_default();
+            names.get(hash) == Some(&record.mesh.as_str())
+        };
+        let (mut records, others): (Vec<Record>, Vec<Record>) =
+            own.iter().cloned().partition(|record| is_in(record));
+        let counts = study.methods.iter().filter_map(|method| method.spheres.as_ref());
+        let counts: BTreeSet<usize> = counts.chain([&study.spheres]).flatten().copied().collect();
+        let mut frozen: Vec<Record> = self.records.clone();
+        frozen.retain(|record| match record.simplify.level {
+            Target::Spheres(count) => counts.contains(&count),
+            Target::MaxError(bound) => study.max_error.contains(&bound),
+            Target::Native(_) => !study.counts_only,
+            Target::Published if record.simplify.method == INITIAL => !study.counts_only,
+            Target::Published => study.published,
+        });
+        frozen.retain_mut(|record| {
+            let name = record.mesh_hash.as_deref().and_then(|hash| names.get(hash));
+            record.mesh = name.map_or_else(String::new, |&name| name.to_owned());
+            record.edition = Some(edition.name.clone());
+            // It is not in the folder of the comparison.
+            record.artifact = None;
+            name.is_some()
+        });
+        // By method and parameters: whether each frozen result was also found here.
+        let row = |record: &Record| {
+            let simplify = &record.simplify;
+            json!([simplify.method, simplify.params]).to_string()
+        };
+        let place = |record: &Record| {
+            (row(record), json!([record.mesh, record.simplify.level]).to_string())
+        };
+        let found: BTreeMap<_, &Option<String>> = (records.iter())
+            .filter(|record| record.simplify.variant.is_none())
+            .map(|record| (place(record), &record.result_hash))
+            .collect();
+        let mut repeated: BTreeMap<String, bool> = BTreeMap::new();
+        for record in &frozen {
+            let is_same = found.get(&place(record)) == Some(&&record.result_hash);
+            *repeated.entry(row(record)).or_insert(true) &= is_same;
+        }
+        frozen.retain(|record| !repeated[&row(record)]);
+        records.extend(frozen);
+        let mut notes = vec![];
+        let left_out: BTreeSet<&str> = others.iter().map(|record| record.mesh.as_str()).collect();
+        let list = |names: Vec<String>| names.join(", ");
+        if !left_out.is_empty() {
+            let names = list(left_out.iter().map(|&name| name.to_owned()).collect());
+            let count = left_out.len();
+            let (are, they) = if count == 1 { ("mesh is", "its") } else { ("meshes are", "their") };
+            notes.push(format!(
+                "{count} {are} not in edition {} and left out of the tables and plots: {names}; a report without \
+                 --against has {they} results.",
+                edition.name
+            ));
+        }
+        let absent = edition.mesh.len() - names.len();
+        if absent > 0 {
+            let all = edition.mesh.len();
+            notes.push(format!(
+                "{absent} of the {all} meshes of edition {} are not in this comparison.",
+                edition.name
+            ));
+        }
+        let other = counts.iter().filter(|count| !edition.spheres.contains(count));
+        let other: Vec<String> = other.map(usize::to_string).collect();
+        if !other.is_empty() {
+            let known = list(edition.spheres.iter().map(usize::to_string).collect());
+            notes.push(format!(
+                "Edition {} has no results at these sphere counts: {} (it has {known}).",
+                edition.name,
+                list(other)
+            ));
+        }
+        Mixed { records, notes }
+    }
+}

@@ -1,0 +1,62 @@
+//! Editions: frozen results that others compare against, part of the program.
+//!
+//! The folder of an edition holds `study.toml`, from which it is made, `edition.toml`, its description, and
+//! `records.jsonl.gz`, its records. The runner reads the description and checks the records against it.
+
+use std::io::{self, Read, Write};
+
+use flate2::Compression;
+use flate2::read::GzDecoder;
+use flate2::write::GzEncoder;
+
+use crate::journal::{Journaled, parse_records, to_line};
+use crate::{JournalError, Record};
+
+/// Name of the description of an edition in its folder.
+pub const DESCRIPTION: &str = "edition.toml";
+/// Name of its records.
+pub const RECORDS: &str = "records.jsonl.gz";
+/// Most bytes of the records of an edition, unpacked: a small file can unpack to any size.
+const MOST_BYTES: u64 = 1 << 28;
+
+/// An edition as it is stored.
+pub struct Embedded {
+    /// Its name, which is that of its folder.
+    pub name: &'static str,
+    /// The text of its description.
+    pub description: &'static str,
+    /// Its packed records.
+    pub records: &'static [u8],
+}
+
+/// The editions of this build, the oldest first.
+pub const EDITIONS: &[Embedded] = &[Embedded {
+    name: "2027.1",
+    description: include_str!("2027.1/edition.toml"),
+    records: include_bytes!("2027.1/records.jsonl.gz"),
+}];
+
+/// Records as packed JSON lines; equal records are equal bytes.
+///
+/// # Errors
+/// When a record has no JSON form.
+pub fn pack(records: &[Record]) -> Result<Vec<u8>, JournalError> {
+    let text = records.iter().map(to_line).collect::<Result<String, _>>()?;
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    // Writing to a vector never fails.
+    let packed = encoder.write_all(text.as_bytes()).and_then(|()| encoder.finish());
+    Ok(packed.unwrap_or_default())
+}
+
+/// The records of packed JSON lines.
+///
+/// # Errors
+/// When the bytes are no gzip, or unpack to more than 256 MB.
+pub fn unpack(bytes: &[u8]) -> io::Result<Journaled> {
+    let mut text = Vec::new();
+    GzDecoder::new(bytes).take(MOST_BYTES + 1).read_to_end(&mut text)?;
+    if text.len() as u64 > MOST_BYTES {
+        return Err(io::Error::other("more than 256 MB unpacked"));
+    }
+    Ok(parse_records(&text))
+}
