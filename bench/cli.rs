@@ -146,7 +146,7 @@ medial
 compare
   medial compare
   medial compare builtin:torus --methods qmat,hem --spheres 200,50
-  medial compare --dataset builtin --max-error 0.02 --out within-2-percent
+  medial compare --methods qmat:k=0 --against 2027.1 --out k-is-0
 check
   medial check qmat
   medial check qmat --set k=0 --timeout 60
@@ -164,7 +164,7 @@ axis
 evaluate
   medial axis builtin:blob -o blob.ma
   medial evaluate builtin:blob blob.ma
-  medial evaluate builtin:blob blob.ma --certify 1e-3 --json
+  medial evaluate builtin:blob blob.ma --against 2027.1
 render
   medial render builtin:bracket -o bracket.png
   medial axis builtin:blob -o blob.ma

@@ -11,7 +11,7 @@ use crate::text::{counted, grouped, printable, trimmed};
 
 /// Largest relative difference of reached from requested spheres at which results still count as results at the same
 /// number of spheres. Methods that search on a native level cannot hit every count.
-const COUNT_TOLERANCE: f64 = 0.02;
+pub const COUNT_TOLERANCE: f64 = 0.02;
 
 /// Every record that counts, by mesh, series and level.
 pub(crate) struct Comparison<'a> {

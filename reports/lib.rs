@@ -40,6 +40,7 @@ mod text;
 mod view3d;
 mod write;
 
+pub use comparison::COUNT_TOLERANCE;
 pub use header::{Header, MethodNote, RunNote, Running};
 pub use journal::{
     BadLine, Journal, JournalError, Journaled, check_regular, parse_records, read_records,

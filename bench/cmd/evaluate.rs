@@ -15,6 +15,7 @@ use crate::exit::{Exit, Failure};
 use crate::files::shape_of;
 use crate::output::{counted, note, print_error, print_json, print_line};
 use crate::progress::StageLine;
+use crate::study::edition::Edition;
 use crate::study::external::{AxisOptions, read_axis};
 
 /// Arguments of `evaluate`.
@@ -34,6 +35,10 @@ pub struct Arguments {
     /// Certify the Hausdorff distance by an interval of at most this width, as a fraction of the diagonal.
     #[arg(long, value_name = "TOL")]
     certify: Option<f64>,
+    /// Also print the rank of each result among those of an edition at its sphere count, measured as the edition is: a
+    /// name such as `2027.1`, or a folder.
+    #[arg(long, value_name = "EDITION", conflicts_with_all = ["samples", "seed"])]
+    against: Option<PathBuf>,
     #[command(flatten)]
     measure: MeasureArguments,
 }
@@ -43,7 +48,11 @@ pub struct Arguments {
 /// # Errors
 /// When the surface or the only medial mesh is refused.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
-    let options = arguments.measure.judge_options(arguments.seed);
+    let edition = arguments.against.as_deref().map(Edition::open).transpose()?;
+    let options = match &edition {
+        Some(edition) => edition.description.judge_options(),
+        None => arguments.measure.judge_options(arguments.seed),
+    };
     let line = StageLine::new(global.stages());
     line.at("reading");
     let (input, shape) = shape_of(&arguments.mesh, ShapeOptions::default())?;
@@ -54,6 +63,9 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let rows = arguments.axes.iter().map(|path| evaluate(path, arguments, (&shape, &judge), &line));
     let mut rows: Vec<_> = rows.collect();
     drop(line);
+    for row in rows.iter_mut().flatten() {
+        row.place = edition.as_ref().map(|edition| edition.place(&input.hash, &row.evaluation));
+    }
     let warnings = &input.report.warnings;
     // One file keeps the exit codes and the object of a single evaluation.
     if rows.len() == 1 {
@@ -64,6 +76,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
             print_json(&row, &warnings);
         } else {
             print_evaluation(&row.evaluation);
+            row.place.iter().for_each(|place| print_line(&format!("  {place}")));
             let all = row.evaluation.warnings.iter().chain(&warnings);
             all.for_each(|warning| print_line(&format!("  warning: {warning}")));
         }
@@ -86,6 +99,9 @@ struct Evaluated {
     /// The change of units before the evaluation, if `--fit` found one.
     #[serde(skip_serializing_if = "Option::is_none")]
     fit: Option<Fit>,
+    /// The rank in an edition, with `--against`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    place: Option<String>,
     /// Notes of the reader.
     // Not in JSON, because no number depends on them.
     #[serde(skip)]
@@ -120,7 +136,7 @@ fn evaluate(
         witness.point = to_normal.backward(witness.point);
     }
     let evaluation = Evaluation { certified, ..judge.evaluate(&mesh).map_err(failed)? };
-    Ok(Evaluated { evaluation, fit, notes, defects })
+    Ok(Evaluated { evaluation, fit, place: None, notes, defects })
 }
 
 /// The evaluations next to each other: a row for each metric, a column for each file.
@@ -183,6 +199,7 @@ fn print_table(
     }
     for (file, row) in files.iter().zip(rows) {
         let Ok(row) = row else { continue };
+        row.place.iter().for_each(|place| print_line(&format!("{}: {place}", file.display())));
         for warning in row.evaluation.warnings.iter().chain(&row.defects) {
             print_line(&format!("warning: {}: {warning}", file.display()));
         }

@@ -17,7 +17,7 @@ use crate::files;
 use crate::output::{print_json, print_line};
 use crate::provenance::{Provenance, hex_digest};
 use crate::rebuild::{Rebuilt, STUDY, of_items, rebuild, records, write_study};
-use crate::store::{PAGE, RESULTS, Store, artifact_path};
+use crate::store::{AXES, PAGE, RESULTS, Store, artifact_path};
 use crate::study::edition::{Description, EditionMesh};
 use crate::study::registry::Registry;
 use crate::study::{Study, VOLUME_DEPTH, unique_names};
@@ -222,17 +222,12 @@ fn freeze(dir: &Path, records: &[Record], to: &Path, registry: &Registry) -> Res
         }
     }
     native.retain(|_, levels| !levels.is_empty());
-    // Of the first meshes one result of few spheres each, of one method after the other.
-    let coarsest = study.spheres.iter().min().copied().unwrap_or(0);
-    let mut kept = vec![];
-    for (k, mesh) in mesh.iter().take(KEPT).enumerate() {
-        let own = frozen.iter().filter(|record| {
-            let is_coarsest = record.simplify.level == Target::Spheres(coarsest);
-            record.mesh == mesh.name && is_coarsest && record.artifact.is_some()
-        });
-        let own: Vec<&str> = own.filter_map(|record| record.artifact.as_deref()).collect();
-        kept.extend(own.get(3 * k % own.len().max(1)).map(|&artifact| artifact.to_owned()));
-    }
+    // Spread over meshes and methods; with few spheres they are small.
+    let coarsest = study.spheres.iter().min().map(|&count| Target::Spheres(count));
+    let coarse = frozen.iter().filter(|record| Some(record.simplify.level) == coarsest);
+    let coarse: Vec<&String> = coarse.filter_map(|record| record.artifact.as_ref()).collect();
+    let count = KEPT.min(coarse.len());
+    let kept: Vec<String> = (0..count).map(|k| coarse[k * coarse.len() / count].clone()).collect();
     for record in &mut frozen {
         // Without what only the store needs.
         record.key.clear();
@@ -265,6 +260,10 @@ fn freeze(dir: &Path, records: &[Record], to: &Path, registry: &Registry) -> Res
         mesh,
     };
     let text = toml::to_string(&description).map_err(|error| Failure::at(to, error))?;
+    if to.join(editions::DESCRIPTION).exists() {
+        // Those of the edition that this one replaces.
+        let _ = fs::remove_dir_all(to.join(AXES));
+    }
     for artifact in &kept {
         let [from, target] = [dir, to].map(|folder| folder.join(artifact));
         let bytes = fs::read(&from).map_err(|error| Failure::at(&from, error))?;

@@ -16,7 +16,8 @@ use medial::simplifier::Simplified;
 use medial::surface::{SurfaceReport, TriMesh};
 use medial::{complex, surface};
 use medial_reports::{
-    Conditions, Initial, Record, Repetition, Simplify, Stages, Status, Target, file_stem,
+    COUNT_TOLERANCE, Conditions, Initial, Record, Repetition, Simplify, Stages, Status, Target,
+    file_stem,
 };
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
@@ -201,10 +202,6 @@ pub fn mesh_hash(mesh: &MedialMesh) -> String {
     indices.for_each(|index| hasher.update(index.to_le_bytes()));
     hex(&hasher.finalize())
 }
-
-/// Largest relative difference between the number of spheres and the requested number at which a
-/// result still counts as having that number.
-const COUNT_TOLERANCE: f64 = 0.02;
 
 /// The record of a level that was not run, or did not finish.
 pub fn failure_record(

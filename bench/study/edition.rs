@@ -8,10 +8,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use medial::metrics::DEFINITIONS;
+use medial::metrics::{DEFINITIONS, Evaluation, JudgeOptions};
 use medial::surface::Sampling;
 use medial_reports::editions::{DESCRIPTION, EDITIONS, Embedded, RECORDS, unpack};
-use medial_reports::{Record, Target, check_regular};
+use medial_reports::{COUNT_TOLERANCE, Record, Target, check_regular, significant};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -148,7 +148,8 @@ pub enum EditionError {
 pub struct Edition {
     /// The description.
     pub description: Description,
-    records: Vec<Record>,
+    /// The records as frozen.
+    pub records: Vec<Record>,
 }
 
 /// The records of a comparison together with those of an edition.
@@ -157,6 +158,14 @@ pub struct Mixed {
     pub records: Vec<Record>,
     /// Sentences on what was left out.
     pub notes: Vec<String>,
+}
+
+impl Description {
+    /// The options of the judge.
+    pub fn judge_options(&self) -> JudgeOptions {
+        let Self { samples, volume_depth, seed, .. } = *self;
+        JudgeOptions { samples, volume_depth, seed }
+    }
 }
 
 impl Edition {
@@ -248,6 +257,37 @@ impl Edition {
         }
     }
 
+    /// The place of a result among those of the edition on its mesh and near its sphere count, as a sentence.
+    pub fn place(&self, hash: &str, evaluation: &Evaluation) -> String {
+        let Description { name, mesh, spheres, .. } = &self.description;
+        let own = evaluation.counts.spheres as usize;
+        let Some(mesh) = mesh.iter().find(|mesh| mesh.sha256 == hash) else {
+            return format!("this mesh is not in edition {name}");
+        };
+        let near = |count: usize| own.abs_diff(count) as f64 <= COUNT_TOLERANCE * count as f64;
+        let Some(&count) = spheres.iter().find(|&&count| near(count)) else {
+            let known: Vec<String> = spheres.iter().map(usize::to_string).collect();
+            let known = known.join(", ");
+            return format!("edition {name} has no results near {own} spheres (it has {known})");
+        };
+        let rivals = self.records.iter().filter(|record| {
+            record.simplify.level == Target::Spheres(count)
+                && record.mesh_hash.as_deref() == Some(hash)
+                && record.status.is_ok()
+        });
+        let errors =
+            rivals.filter_map(|record| Some(record.evaluate.as_ref()?.distances.hausdorff));
+        let errors: Vec<f64> = errors.collect();
+        let error = evaluation.distances.hausdorff;
+        let rank = 1 + errors.iter().filter(|&&other| other < error).count();
+        format!(
+            "{} %: rank {rank} of {} at {count} spheres on {} ({name})",
+            significant(100.0 * error, 3),
+            errors.len() + 1,
+            mesh.name
+        )
+    }
+
     /// The records of a comparison on meshes of the edition, and the edition's on these meshes at the levels of the study.
     /// A method that gives the same results in both has its own rows alone.
     pub fn beside(&self, study: &Study, own: &[Record]) -> Mixed {
@@ -317,13 +357,11 @@ impl Edition {
                 edition.name
             ));
         }
-        let absent = edition.mesh.len() - names.len();
-        if absent > 0 {
-            let all = edition.mesh.len();
-            notes.push(format!(
-                "{absent} of the {all} meshes of edition {} are not in this comparison.",
-                edition.name
-            ));
+        let [here, all] = [names.len(), edition.mesh.len()];
+        if here < all {
+            let name = &edition.name;
+            notes
+                .push(format!("This comparison has {here} of the {all} meshes of edition {name}."));
         }
         let other = counts.iter().filter(|count| !edition.spheres.contains(count));
         let other: Vec<String> = other.map(usize::to_string).collect();

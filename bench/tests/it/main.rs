@@ -7,6 +7,7 @@ mod cli_compare;
 mod cli_simplify;
 mod command;
 mod diff;
+mod edition;
 mod external_results;
 mod faults;
 mod history;

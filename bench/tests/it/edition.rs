@@ -1,0 +1,147 @@
+//! Editions: frozen results next to new ones.
+
+use std::fs;
+use std::path::Path;
+
+use medial_bench::study::edition::{Edition, EditionError};
+use medial_bench::study::source::{Input, Source};
+use medial_reports::editions::{DESCRIPTION, EDITIONS, RECORDS};
+use serde_json::{Value, json};
+
+use crate::command::{done, folder, json, refused, words};
+
+/// The line of a method in a printed table, as words.
+fn row<'o>(stdout: &'o str, method: &str) -> Option<Vec<&'o str>> {
+    stdout.lines().find_map(|line| Some(words(line.strip_prefix(method)?)))
+}
+
+#[test]
+fn frozen_rows_are_matched_by_content_and_not_run() {
+    let at = folder();
+    let [surface, same, edition] = ["a.off", "b.off", "test.1"].map(&at);
+    done(&["datasets", "make", "capsule", "-o", &surface]);
+    fs::copy(&surface, &same).expect("copied");
+    let study = words("--spheres 50,20 --samples 500 --counts-only");
+    let compare = |words: &[&str], out: &str| {
+        done(&[&["compare"], words, &study[..], &["--out", &at(out)]].concat())
+    };
+    compare(&[&surface, "builtin:sphere", "--methods", "qmat,angle"], "frozen");
+    done(&["report", &at("frozen"), "--freeze", &edition]);
+
+    let own = [&same, "builtin:box", "--methods", "qmat,qmat:k=0", "--against", &edition];
+    let stdout = compare(&own, "own");
+    let records = crate::command::records(at("own"));
+    assert!(records.len() == 8 && records.iter().all(|r| r["simplify"]["method"] == "qmat"));
+    // Its seconds are in the last column alone; equal results of `qmat` have one row.
+    let angle = row(&stdout, "angle (test.1)").expect("a row");
+    assert!(angle[4] == "–" && angle[5].parse::<f64>().is_ok(), "{stdout}");
+    assert!(row(&stdout, "qmat k=0").is_some() && row(&stdout, "qmat (test.1)").is_none());
+    for note in ["1 mesh is not in edition test.1", ": box;", "has 1 of the 2 meshes"] {
+        assert!(stdout.contains(note), "{note}: {stdout}");
+    }
+    let table = |name: &str| fs::read_to_string(at(name)).expect("a table");
+    let csv = table("own/results.csv");
+    assert!(csv.contains("frozen_seconds_total") && !csv.contains("\nbox,"), "{csv}");
+    assert!(table("own/tables/mesh-b.md").contains("angle (test.1)"));
+    assert!(!table("own/plots/mesh-b-time.svg").contains("angle"));
+    // The study of the store has the edition, so a rebuilt report is the same.
+    let page = table("own/index.html");
+    done(&["report", &at("own")]);
+    assert!(page.contains("frozen results of edition test.1") && page == table("own/index.html"));
+    let (_, object) = json(&[&["compare"], &own[..4], &study, &["--out", &at("own")]].concat());
+    assert!(object["run"] == 0 && !table("own/index.html").contains("test.1"), "{object}");
+}
+
+#[test]
+fn editions_that_do_not_compare_are_refused_before_any_run() {
+    let at = folder();
+    let edition = at("test.1");
+    let frozen =
+        "compare builtin:capsule --methods pmat --spheres 20 --samples 500 --counts-only -q --out";
+    done(&[&words(frozen)[..], &[&at("frozen")]].concat());
+    done(&["report", &at("frozen"), "--freeze", &edition]);
+    let against = |line: &str, code: i32, message: &str| {
+        let line = format!("compare {line} --methods pmat --spheres 20 --out {}", at("own"));
+        refused(&words(&line), code, message);
+        assert!(!Path::new(&at("own")).exists(), "nothing is written");
+    };
+    let named = |line: &str| format!("{line} --against {edition}");
+    against(&named("builtin:capsule"), 2, "--samples 10000: edition test.1 was measured with 500");
+    let seeded = named("builtin:capsule --samples 500 --seed 1");
+    against(&seeded, 2, "--seed 1: edition test.1");
+    against(&named("builtin:box --samples 500"), 2, "no mesh of this comparison");
+    against("builtin:capsule --against 2027.11", 2, "did you mean `2027.1`?");
+    let [description, records] = [DESCRIPTION, RECORDS].map(|name| format!("{edition}/{name}"));
+    let text = fs::read_to_string(&description).expect("a description");
+    let equal = named("builtin:capsule --samples 500");
+    fs::write(&description, text.replace("metrics = ", "metrics = 9")).expect("written");
+    against(&equal, 1, "version 91 of the metrics");
+    fs::write(&description, text.replace("metrics = ", "measures = ")).expect("written");
+    against(&equal, 1, "edition.toml: TOML parse error");
+    fs::write(&description, &text).expect("written");
+    let packed = fs::read(&records).expect("records");
+    fs::write(&records, &packed[..packed.len() / 2]).expect("written");
+    against(&equal, 1, "the records have changed");
+}
+
+#[test]
+fn stored_results_have_the_numbers_of_their_edition() {
+    for embedded in EDITIONS {
+        let folder =
+            format!("{}/../reports/editions/{}", env!("CARGO_MANIFEST_DIR"), embedded.name);
+        assert!(embedded.records.len() < 4 << 20, "{} bytes", embedded.records.len());
+        let edition = match Edition::open(Path::new(embedded.name)) {
+            // Its numbers have other definitions, as a new version declares.
+            Err(EditionError::Definitions { .. }) => continue,
+            edition => edition.expect("an edition"),
+        };
+        let mut kept = edition.records.clone();
+        kept.retain(|record| record.artifact.is_some());
+        assert!(kept.len() >= 5, "{} results", kept.len());
+        for record in kept {
+            let mesh = edition.description.mesh.iter().find(|mesh| mesh.name == record.mesh);
+            let source = Source::parse(Path::new(&mesh.expect("its mesh").source));
+            let input = Input::load(&source.expect("a source")).expect("a mesh");
+            let shape = input.shape(Default::default()).expect("a shape");
+            let options = edition.description.judge_options();
+            let judge = shape.judge(input.axis.as_ref(), options).expect("a judge");
+            let path = Path::new(&folder).join(record.artifact.as_deref().unwrap_or_default());
+            let axis = medial::complex::read(&path).expect("a medial mesh").mesh;
+            let to_normal = shape.normalisation();
+            let axis = axis.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));
+            let evaluation = judge.evaluate(&axis).expect("an evaluation");
+            let mut moved = vec![];
+            compare("", &json!(record.evaluate), &json!(evaluation), &mut moved);
+            assert!(
+                moved.is_empty(),
+                "{}: {moved:?}; increase medial::metrics::DEFINITIONS and freeze a new edition",
+                path.display()
+            );
+        }
+    }
+}
+
+/// Lists the numbers of two evaluations that differ by more than 1e-9.
+fn compare(path: &str, old: &Value, new: &Value, moved: &mut Vec<String>) {
+    match (old, new) {
+        // Added later, or certified in the edition alone.
+        (Value::Null, _) | (_, Value::Null) => {}
+        (Value::Object(old), Value::Object(new)) => {
+            for (key, old) in old {
+                compare(&format!("{path}/{key}"), old, &new[key], moved);
+            }
+        }
+        (Value::Array(old), Value::Array(new)) => {
+            for (k, old) in old.iter().enumerate() {
+                compare(&format!("{path}/{k}"), old, &new[k], moved);
+            }
+        }
+        (Value::Number(a), Value::Number(b)) => {
+            let [a, b] = [a, b].map(|number| number.as_f64().unwrap_or(f64::NAN));
+            if !((a - b).abs() <= 1e-9) {
+                moved.push(format!("{path}: {a}, {b}"));
+            }
+        }
+        _ => {}
+    }
+}
