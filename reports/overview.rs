@@ -13,7 +13,7 @@ use crate::text::{counted, grouped, printable, shortened};
 
 /// The longest line of the terminal and the longest name of a method there, in characters.
 const WIDTH: usize = 100;
-const NAME: usize = 20;
+const NAME: usize = 22;
 
 /// The methods with a mean at the requested count nearest to 100, the least error first. Those without one are named in
 /// the last note with the reason. `None` where no method has one.
@@ -92,6 +92,9 @@ pub fn summary_text(records: &[Record], methods: &[MethodNote]) -> String {
     let comparison = Comparison::new(records);
     let mut text = String::new();
     if let Some(table) = overview_table(&comparison, &by_count(&comparison), methods) {
+        // The names and seconds of an edition take its room.
+        let is_mixed = comparison.edition_note().is_some();
+        let table = if is_mixed { table.without(&["best suited for"]) } else { table };
         text += &format!("{}\n{}", table.caption, plain(&table));
         table.notes.iter().for_each(|note| text += &wrapped(note));
     }
@@ -124,7 +127,10 @@ fn plain(table: &Table) -> String {
                 false => format!("{:<width$}  ", line[k]),
             };
         }
-        row += &shortened(&line[last], room);
+        row += &match (shortened(&line[last], room), table.columns[last].number) {
+            (end, true) => format!("{end:>0$}", widest(last)),
+            (end, false) => end,
+        };
         text = text + row.trim_end() + "\n";
     }
     text
