@@ -39,6 +39,11 @@ fn frozen_rows_are_matched_by_content_and_not_run() {
     for note in ["1 mesh is not in edition test.1", ": box;", "has 1 of the 2 meshes"] {
         assert!(stdout.contains(note), "{note}: {stdout}");
     }
+    // It has the error of the frozen `qmat`, which is no better.
+    let least = records.iter().find(|r| r["simplify"]["level"] == json!({ "spheres": 20 }));
+    let least = at("own") + "/" + least.expect("a result")["artifact"].as_str().expect("a file");
+    let place = done(&["evaluate", &same, &least, "--against", &edition]);
+    assert!(place.contains("rank 1 of 3 at 20 spheres on a (test.1)"), "{place}");
     let table = |name: &str| fs::read_to_string(at(name)).expect("a table");
     let csv = table("own/results.csv");
     assert!(csv.contains("frozen_seconds_total") && !csv.contains("\nbox,"), "{csv}");
