@@ -182,6 +182,10 @@ const KEPT: usize = 5;
 
 /// Writes the records of the study of a store as an edition.
 fn freeze(dir: &Path, records: &[Record], to: &Path, registry: &Registry) -> Result<(), Failure> {
+    // A store has the same folder for its results, which the next edition would replace.
+    if to.join(RESULTS).exists() {
+        return Err(Failure::at(to, "a folder of results; freeze into a folder of its own"));
+    }
     let here = Provenance::here();
     let study = Study::read(&dir.join(STUDY))?;
     let items = study.items(registry, &here)?;

@@ -490,7 +490,7 @@ impl Guard {
         this
     }
 
-    /// Whether so many faces cross that no more is refused: at the axis of a tube the start is a tangle of tiny faces.
+    /// Whether more faces may come to cross, as many do: at the axis of a tube, the start is a tangle of tiny faces.
     pub fn is_tangled(&self) -> bool {
         self.is_tangled
     }

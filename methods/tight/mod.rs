@@ -299,8 +299,8 @@ const WATCHED: f64 = 1.9;
 /// With an error this many times below that, it takes large passes.
 const FAR: f64 = 3.0;
 
-/// From a count within the bound, fewer spheres by this power of the error. From one that misses it, more of them by
-/// another power, so many times at least and at most: to reach the bound soon, because a miss costs a trial.
+/// From a count within the bound, the next one is smaller by this power of the error. From a count that misses it, the next
+/// one is larger by the power `MORE`, within the limits `GROWTH`. That is generous, because each miss costs a trial.
 const RATE: f64 = 0.9;
 const MORE: f64 = 1.3;
 const GROWTH: [f64; 2] = [1.15, 1.6];

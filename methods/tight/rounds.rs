@@ -23,8 +23,7 @@ use super::TightParams;
 use super::collapse::{Guard, Part, Still, clamp};
 use super::goal::{
     self, ASIDE, DEEP, Edited, Goal, Held, Interior, Points, Residuals, Row, Sample, held_from,
-    nearest, nearest_after, nearest_balls, places, refused, residuals, uncovered, union_of,
-    vertices,
+    nearest_after, nearest_balls, places, refused, residuals, uncovered, union_of, vertices,
 };
 use super::start::swapped;
 use crate::Result;
@@ -417,7 +416,7 @@ impl<'a> Descent<'a> {
         share: f64,
     ) -> Result<Self> {
         clamp(&mut mesh, goal);
-        let nearest = nearest(&mesh, &points, &[])?;
+        let nearest = goal::nearest(&mesh, &points, &[])?;
         let held = places(&mesh, share, |_| true);
         Self::of_parts(goal, points, mesh, nearest, held, rest)
     }

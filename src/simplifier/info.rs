@@ -146,12 +146,7 @@ impl NativeLevel {
 
     /// A level of which a larger value leaves more spheres.
     pub fn larger_is_finer(name: impl Into<Text>, unit: impl Into<Text>) -> Self {
-        Self {
-            name: name.into(),
-            unit: unit.into(),
-            larger_is_coarser: false,
-            is_error_bound: false,
-        }
+        Self { larger_is_coarser: false, ..Self::larger_is_coarser(name, unit) }
     }
 }
 

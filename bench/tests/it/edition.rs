@@ -27,6 +27,8 @@ fn frozen_rows_are_matched_by_content_and_not_run() {
     };
     compare(&[&surface, "builtin:sphere", "--methods", "qmat,angle"], "frozen");
     done(&["report", &at("frozen"), "--freeze", &edition]);
+    // The next edition in the same folder would replace the results.
+    refused(&["report", &at("frozen"), "--freeze", &at("frozen")], 1, "a folder of results");
 
     let own = [&same, "builtin:box", "--methods", "qmat,qmat:k=0", "--against", &edition];
     let stdout = compare(&own, "own");

@@ -48,6 +48,10 @@ impl Parts {
 
     /// The primitive of least signed distance, if that is below a limit.
     pub fn below(&self, p: Vec3, limit: f64) -> Option<NearestPrimitive> {
+        // Nothing is below that, and a search with it would visit all.
+        if limit == f64::NEG_INFINITY {
+            return None;
+        }
         let mut search = Below { parts: self, p, limit, found: None };
         self.search(&mut search);
         let found = search.found?;
