@@ -33,7 +33,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Verb {
     /// Run methods on meshes, measure the results, write tables, plots and a page.
-    Compare(cmd::compare::Arguments),
+    Compare(Box<cmd::compare::Arguments>),
     /// Print counts, defects and topology of a mesh.
     Info(cmd::info::Arguments),
     /// Compute the initial Voronoi medial mesh.

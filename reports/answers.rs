@@ -11,6 +11,7 @@ use std::cmp::Ordering;
 use crate::comparison::{Comparison, Entry, reached};
 use crate::metric::{HAUSDORFF, MIN_ANGLE, TOTAL_SECONDS, median};
 use crate::record::{Record, Status, Target};
+use crate::statistics::{FEWEST, Pairs};
 use crate::summary::{Ratio, reference, topology};
 use crate::tables::{Cell, Column, Table};
 use crate::text::{counted, grouped, significant};
@@ -28,12 +29,12 @@ const USABLE: f64 = 2.0;
 const RANKED: f64 = 5.0;
 
 /// For each mesh the least value of a method; `None` where the method did not run.
-type Values = Vec<Option<Found>>;
+pub(crate) type Values = Vec<Option<Found>>;
 
 /// A value and the seconds of the result that has it; infinite and unknown without a result.
 #[derive(Clone, Copy)]
-struct Found {
-    value: f64,
+pub(crate) struct Found {
+    pub(crate) value: f64,
     seconds: f64,
 }
 
@@ -61,7 +62,9 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
     );
     let medians = "Medians over the meshes that a method ran on. A missing result counts as infinite. A method needs \
          results on at least half of its meshes. If another method has results on more meshes, it is named, too. The \
-         ratio to the runner-up is a geometric mean over the meshes where both have a result."
+         ratio to the runner-up is a geometric mean over the meshes where both have a result, with its 95 % interval \
+         if they are at least six. A difference is established if the signed-rank test over meshes, corrected for all \
+         pairs of methods, has p < 0.05."
         .to_owned();
     let notes = [how.to_owned(), rule].into_iter().chain((!is_one).then_some(medians));
     let columns = [
@@ -72,6 +75,7 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
         "meshes",
         "runner-up",
         "ratio to it",
+        "difference established",
     ];
     let table = Table {
         caption: "Which method?".to_owned(),
@@ -81,7 +85,7 @@ pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Ta
         grouped: false,
     };
     // Counts of meshes are redundant for one mesh.
-    let table = if is_one { table.without(&["meshes"]) } else { table };
+    let table = if is_one { table.without(&["meshes", "difference established"]) } else { table };
     (!table.rows.is_empty()).then_some(table)
 }
 
@@ -168,7 +172,7 @@ pub(crate) fn usual_level(comparison: &Comparison<'_>) -> Option<(usize, usize)>
 
 /// For each series and mesh the least value of its results, at one level or at all of them. The medial mesh that all
 /// methods start from is no method's result.
-fn values(
+pub(crate) fn values(
     comparison: &Comparison<'_>,
     level: Option<usize>,
     value: impl Fn(&Entry<'_>) -> Option<f64>,
@@ -191,7 +195,7 @@ fn values(
 }
 
 /// The errors of the results at a count, up to [`RANKED`].
-fn errors_at(comparison: &Comparison<'_>, level: usize) -> Vec<Values> {
+pub(crate) fn errors_at(comparison: &Comparison<'_>, level: usize) -> Vec<Values> {
     values(comparison, Some(level), |entry| {
         HAUSDORFF.of(entry.record).filter(|&error| entry.comparable() && error <= RANKED)
     })
@@ -211,8 +215,8 @@ fn middle(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// The rank of a series by one criterion.
-struct Rank {
-    series: usize,
+pub(crate) struct Rank {
+    pub(crate) series: usize,
     /// `None` where fewer than half of the meshes have a result.
     median: Option<f64>,
     /// Meshes that the method ran on without a result.
@@ -251,17 +255,8 @@ fn by_meshes(a: &Rank, b: &Rank) -> Ordering {
     a.missed.cmp(&b.missed).then_with(|| by_median(a, b))
 }
 
-/// The geometric mean of the ratios of two series, over the meshes where both have a result.
-fn lead(first: &Values, second: &Values) -> Option<f64> {
-    let found = first.iter().zip(second).filter_map(|(a, b)| Some([(*a)?.value, (*b)?.value]));
-    let results = found.filter(|pair| pair.iter().all(|value| value.is_finite()));
-    // Floors: a quotient of zeros is no number.
-    let ratio = Ratio::of(results.map(|[a, b]| a.max(1e-9) / b.max(1e-9)));
-    ratio.map(|ratio| ratio.value)
-}
-
 /// The series that have a median, the best first.
-fn ranked(values: &[Values]) -> Vec<Rank> {
+pub(crate) fn ranked(values: &[Values]) -> Vec<Rank> {
     let ranks = values.iter().enumerate().map(|(series, values)| Rank::of(series, values));
     let mut ranks: Vec<Rank> = ranks.filter(|rank| rank.median.is_some()).collect();
     ranks.sort_by(by_median);
@@ -273,11 +268,12 @@ fn ranked(values: &[Values]) -> Vec<Rank> {
 fn rows_of(comparison: &Comparison<'_>, criterion: &Criterion) -> Vec<Vec<Cell>> {
     let mut ranks = ranked(&criterion.values);
     let Some(first) = ranks.first().map(|rank| rank.series) else { return vec![] };
-    let mut rows = vec![row_of(comparison, criterion, criterion.title.clone(), &ranks)];
+    let pairs = Pairs::of(ranks.iter().map(|rank| rank.series).collect(), &criterion.values);
+    let mut rows = vec![row_of(comparison, criterion, criterion.title.clone(), &ranks, &pairs)];
     ranks.sort_by(by_meshes);
     if ranks[0].series != first {
         let title = format!("{}, on the most meshes", criterion.title);
-        rows.push(row_of(comparison, criterion, title, &ranks));
+        rows.push(row_of(comparison, criterion, title, &ranks, &pairs));
     }
     rows
 }
@@ -288,6 +284,7 @@ fn row_of(
     criterion: &Criterion,
     title: String,
     ranks: &[Rank],
+    pairs: &Pairs,
 ) -> Vec<Cell> {
     let first = ranks[0].series;
     let known = criterion.values[first].iter().flatten();
@@ -300,16 +297,21 @@ fn row_of(
         Cell::optional(seconds.map(|seconds| significant(seconds, 3))),
         Cell::from(format!("{} of {}", met.count(), counted(known.count(), "mesh", "meshes"))),
     ];
-    let runner_up = ranks.get(1).and_then(|rank| {
-        Some((rank.series, lead(&criterion.values[first], &criterion.values[rank.series])?))
+    let runner_up = ranks.get(1).map(|rank| rank.series);
+    let pair = runner_up.and_then(|second| pairs.between(first, second));
+    let ratio = pair.as_ref().and_then(|pair| {
+        let ratio = pair.ratio_text()?;
+        Some(format!("{ratio} of {}", criterion.of))
     });
-    cells.extend(match runner_up {
-        Some((second, ratio)) => [
-            Cell::from(comparison.series[second].as_str()),
-            Cell::from(format!("{} of {}", significant(ratio, 2), criterion.of)),
-        ],
-        None => [Cell::from("no other"), Cell::optional(None)],
-    });
+    cells.extend([
+        Cell::from(runner_up.map_or("no other", |second| comparison.series[second].as_str())),
+        Cell::optional(ratio),
+        Cell::optional(pair.map(|pair| match (pair.meshes(), pair.is_established()) {
+            (meshes, _) if meshes < FEWEST => format!("no, n = {meshes} is too few"),
+            (meshes, true) => format!("yes, n = {meshes}"),
+            (meshes, false) => format!("no, n = {meshes}"),
+        })),
+    ]);
     cells
 }
 
@@ -327,10 +329,11 @@ fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) ->
     let title = format!("topology right everywhere, lowest error at {spheres}");
     if ranks.is_empty() {
         let mut cells = vec![Cell::from(title), Cell::from("none")];
-        cells.extend([(); 5].map(|()| Cell::optional(None)));
+        cells.extend([(); 6].map(|()| Cell::optional(None)));
         return cells;
     }
-    row_of(comparison, &error_criterion(errors, title.clone()), title, &ranks)
+    let pairs = Pairs::of(ranks.iter().map(|rank| rank.series).collect(), &errors);
+    row_of(comparison, &error_criterion(errors, title.clone()), title, &ranks, &pairs)
 }
 
 /// All methods at one error bound.
@@ -434,7 +437,7 @@ pub(crate) fn equal_error_table(
         .text("valid on", |(_, row)| format!("{} of {}", row.met, row.requested))
         .number("spheres ↓", |(_, row)| whole(row.spheres))
         .number(format!("÷ {yardstick}"), |(_, row)| {
-            Cell::optional(row.ratio.map(|ratio| significant(ratio.value, 3)))
+            Cell::optional(row.ratio.as_ref().map(Ratio::text))
         })
         .text("on", |(_, row)| {
             Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes")))

@@ -19,12 +19,15 @@ pub(crate) struct Comparison<'a> {
     pub(crate) meshes: Vec<String>,
     /// Labels of the series: a method with its parameters, in the order of the records.
     pub(crate) series: Vec<String>,
-    /// Ids of the methods behind the series.
+    /// Ids of the methods behind the series; of external results their name.
     pub(crate) methods: Vec<&'a str>,
     /// The requested levels: sphere counts from many to few, published, native.
     pub(crate) levels: Vec<Target>,
-    /// One entry for each combination that was run, by mesh, level and series.
+    /// One entry for each combination that was run, by mesh, level and series. With several seeds its record is that of
+    /// the median error.
     pub(crate) entries: Vec<Entry<'a>>,
+    /// The records of entries with several seeds, by mesh, level and series.
+    repeats: BTreeMap<(usize, usize, usize), Vec<&'a Record>>,
     /// Records that a later one of the same item replaced.
     pub(crate) superseded: usize,
 }
@@ -104,27 +107,62 @@ impl<'a> Comparison<'a> {
         levels.sort_by(|&a, &b| compare_levels(a, b));
         levels.dedup_by(|a, b| compare_levels(*a, *b).is_eq());
 
-        let mut by_item = BTreeMap::new();
+        let mut by_item: BTreeMap<_, Vec<&Record>> = BTreeMap::new();
         for record in latest {
             let mesh = mesh_keys.1[&hashes.key(record)];
             let series = series_keys.1[&SeriesKey::of(record)];
             let level = levels
                 .partition_point(|&level| compare_levels(level, record.simplify.level).is_lt());
-            by_item.insert((mesh, level, series), record); // the last one stays
+            by_item.entry((mesh, level, series)).or_default().push(record);
         }
         // The order of the map is that of the tables: by mesh, level and series.
-        let entries = by_item
-            .into_iter()
-            .map(|((mesh, level, series), record)| Entry { mesh, series, level, record })
-            .collect();
+        let entry = |(&(mesh, level, series), records): (&_, &Vec<&'a Record>)| Entry {
+            mesh,
+            series,
+            level,
+            record: median_seed(records),
+        };
+        let entries = by_item.iter().map(entry).collect();
+        by_item.retain(|_, records| records.len() > 1);
         Self {
             meshes: mesh_labels(&mesh_keys.0),
             series: series_labels(&series_keys.0),
-            methods: series_keys.0.iter().map(|key| key.method).collect(),
+            methods: series_keys.0.iter().map(SeriesKey::described_as).collect(),
             levels,
             superseded,
             entries,
+            repeats: by_item,
         }
+    }
+
+    /// The records behind an entry: one for each seed.
+    pub(crate) fn records_of<'e>(&'e self, entry: &'e Entry<'a>) -> &'e [&'a Record] {
+        let repeats = self.repeats.get(&(entry.mesh, entry.level, entry.series));
+        repeats.map_or(std::slice::from_ref(&entry.record), Vec::as_slice)
+    }
+
+    /// The least and largest value of a metric over the seeds of an entry; `None` with one seed.
+    pub(crate) fn range(&self, entry: &Entry<'_>, metric: &Metric) -> Option<[f64; 2]> {
+        let repeats = self.repeats.get(&(entry.mesh, entry.level, entry.series))?;
+        let values: Vec<f64> = repeats.iter().filter_map(|record| metric.of(record)).collect();
+        let ends = [f64::min, f64::max].map(|end| values.iter().copied().reduce(end));
+        Some([ends[0]?, ends[1]?])
+    }
+
+    /// A sentence on the rows of several seeds; `None` without any.
+    pub(crate) fn seeds_note(&self) -> Option<String> {
+        let names = self
+            .repeats
+            .iter()
+            .map(|((_, _, series), records)| (&self.series[*series], records.len()));
+        let most = names.clone().map(|(_, seeds)| seeds).max()?;
+        let names: BTreeSet<&String> = names.map(|(name, _)| name).collect();
+        let names: Vec<&str> = names.into_iter().map(String::as_str).collect();
+        Some(format!(
+            "With {most} seeds: {}. Their numbers are those of the seed with the median Hausdorff error on each mesh, \
+             a failure being infinite.",
+            names.join(", ")
+        ))
     }
 
     /// The entries of one mesh, by level and series.
@@ -231,13 +269,25 @@ pub(crate) fn rises((spheres, error): (f64, f64), results: &[(f64, f64)]) -> boo
     results.iter().any(|&(fewer, least)| fewer < spheres && error > (1.0 + RISE) * least)
 }
 
-/// The records that count: of one mesh, row and level the last one, of any build. Records
+/// The record of the median Hausdorff error, where one without a result is infinite; of an even number the larger one.
+fn median_seed<'a>(records: &[&'a Record]) -> &'a Record {
+    let mut sorted = records.to_vec();
+    let error = |record: &Record| {
+        let error = HAUSDORFF.of(record).filter(|_| record.status.has_result());
+        error.unwrap_or(f64::INFINITY)
+    };
+    sorted.sort_by(|a, b| error(a).total_cmp(&error(b)));
+    sorted[sorted.len() / 2]
+}
+
+/// The records that count: of one mesh, row, level and seed the last one, of any build. Records
 /// of an older build stay where the newer one has none.
 fn latest_records<'a>(records: &'a [Record], hashes: &Hashes<'a>) -> Vec<&'a Record> {
     let mut last = BTreeMap::new(); // by item, the index of its last record
     for (index, record) in records.iter().enumerate() {
         let level = serde_json::to_string(&record.simplify.level).unwrap_or_default();
-        last.insert((hashes.key(record), SeriesKey::of(record).request(), level), index);
+        let seed = record.simplify.seed;
+        last.insert((hashes.key(record), SeriesKey::of(record).request(), level, seed), index);
     }
     let counted: BTreeSet<usize> = last.into_values().collect();
     counted.into_iter().map(|index| &records[index]).collect()
@@ -318,6 +368,7 @@ struct SeriesKey<'a> {
     samples: usize,
     threads: Option<usize>,
     edition: Option<&'a str>,
+    is_external: bool,
 }
 
 impl<'a> SeriesKey<'a> {
@@ -336,7 +387,8 @@ impl<'a> SeriesKey<'a> {
             method: &simplify.method,
             variant: simplify.variant.as_deref(),
             params: if is_external { String::new() } else { params.join(" ") },
-            seed: simplify.seed,
+            // Methods that run with several seeds are measured with one.
+            seed: record.seeds.get("evaluation").copied().unwrap_or(simplify.seed),
             // A rebuild that changed no method gives the same rows.
             build: match record.method_version.as_str() {
                 "" => &record.binary_hash,
@@ -348,6 +400,7 @@ impl<'a> SeriesKey<'a> {
             samples: conditions.map_or(0, |c| c.samples),
             threads: simplify.threads,
             edition: record.edition.as_deref(),
+            is_external,
         }
     }
 
@@ -375,7 +428,12 @@ fn series_labels(keys: &[SeriesKey<'_>]) -> Vec<String> {
     labels
 }
 
-impl SeriesKey<'_> {
+impl<'a> SeriesKey<'a> {
+    /// The id of its [`MethodNote`](crate::MethodNote).
+    fn described_as(&self) -> &'a str {
+        self.variant.filter(|_| self.is_external).unwrap_or(self.method)
+    }
+
     fn name(&self) -> String {
         let name = self.variant.map_or_else(|| self.method_and_params(), str::to_owned);
         self.edition.map_or(name.clone(), |edition| format!("{name} ({edition})"))

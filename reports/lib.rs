@@ -11,6 +11,7 @@
 //! | `summary` | means over meshes at equal numbers of spheres and at native levels |
 //! | `overview` | all methods at one number of spheres: the end of a comparison |
 //! | `answers` | which method for which purpose, at equal counts and equal errors |
+//! | `statistics` | which differences are established: tests over meshes, intervals |
 //! | `tables` | CSV, Markdown, LaTeX |
 //! | `plots` | figures, and their SVG |
 //! | [`history`] | one file for each run, change points over many runs |
@@ -34,6 +35,7 @@ mod pictures;
 mod plots;
 mod record;
 pub mod render;
+mod statistics;
 mod summary;
 mod tables;
 mod text;

@@ -79,6 +79,7 @@ pub(crate) fn overview_table(
     if !missing.is_empty() {
         notes.push(format!("No result at this count: {}.", missing.join("; ")));
     }
+    notes.extend(comparison.seeds_note());
     notes.extend(edition);
     let table = if is_one { table.of_one_mesh() } else { table };
     let meshes = counted(comparison.meshes.len(), "mesh", "meshes");

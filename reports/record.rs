@@ -189,7 +189,7 @@ pub struct Record {
 
 impl Record {
     /// Whether no other item of the run disturbed the seconds: only such seconds are comparable.
-    pub(crate) fn ran_alone(&self) -> bool {
+    pub fn ran_alone(&self) -> bool {
         self.conditions.as_ref().is_none_or(|conditions| conditions.jobs <= 1)
     }
 

@@ -15,6 +15,7 @@ use crate::comparison::{Comparison, Entry, RISING, RISING_NOTE, level_label, rea
 use crate::header::Header;
 use crate::metric::{GEOMETRIC, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
 use crate::record::{Record, Status, Target};
+use crate::statistics::interval;
 use crate::tables::{Cell, Table};
 use crate::text::{counted, grouped, significant, trimmed};
 
@@ -42,6 +43,8 @@ pub(crate) struct SeriesSummary {
     pub(crate) without: BTreeMap<Status, usize>,
     /// Means of the columns by their keys, and the number of meshes that each is over.
     means: BTreeMap<&'static str, (f64, usize)>,
+    /// 95 % intervals of the means of errors over meshes, by the keys of their columns.
+    intervals: BTreeMap<&'static str, [f64; 2]>,
     /// Hausdorff error in relation to the reference's.
     pub(crate) ratio: Option<Ratio>,
     /// Results with the Betti numbers of the solid, of those where both are known; over all meshes
@@ -58,6 +61,8 @@ pub(crate) struct Ratio {
     pub(crate) value: f64,
     /// Number of meshes.
     pub(crate) meshes: usize,
+    /// The 95 % interval over meshes.
+    interval: Option<[f64; 2]>,
 }
 
 impl Ratio {
@@ -66,7 +71,14 @@ impl Ratio {
         let ratios: Vec<f64> = ratios.collect();
         // Ratios are positive: the floor is none.
         let value = Mean::Geometric { floor: f64::MIN_POSITIVE }.of(&ratios)?;
-        Some(Self { value, meshes: ratios.len() })
+        Some(Self { value, meshes: ratios.len(), interval: interval(&ratios) })
+    }
+
+    /// `0.205 [0.17, 0.25]`.
+    pub(crate) fn text(&self) -> String {
+        let ends = self.interval.map(|ends| ends.map(|end| significant(end, 2)).join(", "));
+        let ends = ends.map_or_else(String::new, |ends| format!(" [{ends}]"));
+        significant(self.value, 3) + &ends
     }
 }
 
@@ -74,6 +86,11 @@ impl SeriesSummary {
     /// The mean of one of [`COMPARED`].
     pub(crate) fn mean(&self, metric: &Metric) -> Option<f64> {
         self.means.get(metric.key).map(|(mean, _)| *mean)
+    }
+
+    /// The 95 % interval of the mean of an error.
+    pub(crate) fn interval(&self, metric: &Metric) -> Option<[f64; 2]> {
+        self.intervals.get(metric.key).copied()
     }
 
     /// Meshes that the mean of a metric is over: a result without a triangle, for example, has no angle.
@@ -185,7 +202,7 @@ fn at_count(
         averaged.retain(|entry| {
             set.levels.contains(&level) && entry.comparable() && set.meshes.contains(&entry.mesh)
         });
-        let mut means = BTreeMap::new();
+        let (mut means, mut intervals) = (BTreeMap::new(), BTreeMap::new());
         for metric in comparison.columns() {
             let known = set.known(comparison, series, metric);
             let values = averaged.iter().filter(|entry| known.contains(&entry.mesh));
@@ -194,6 +211,9 @@ fn at_count(
             let enough = 2 * values.len() >= entries.len();
             let mean = metric.mean.of(&values).filter(|_| enough);
             means.extend(mean.map(|mean| (metric.key, (mean, values.len()))));
+            if [HAUSDORFF.key, MEAN_ERROR.key].contains(&metric.key) && enough {
+                intervals.extend(interval(&values).map(|ends| (metric.key, ends)));
+            }
         }
         let mut reached = entries.clone();
         reached.retain(|entry| entry.comparable()); // of all meshes, not of the own set
@@ -210,6 +230,7 @@ fn at_count(
             requested: entries.len(),
             without,
             means,
+            intervals,
             ratio: ratio(&entries, &yardstick),
             topology: topology(&reached),
             rising: reached.iter().any(|entry| comparison.is_rising(entry)),
@@ -371,7 +392,7 @@ pub(crate) fn means_table(
         .text("method", |(_, row)| comparison.series[row.series].as_str())
         .text("means over", |(_, row)| Cell::share((row.over, row.requested)))
         .number(format!("Hausdorff ÷ {yardstick}"), |(_, row)| {
-            Cell::optional(row.ratio.map(|ratio| significant(ratio.value, 3)))
+            Cell::optional(row.ratio.as_ref().map(Ratio::text))
         })
         .text("on", |(_, row)| {
             Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes")))
@@ -395,13 +416,15 @@ pub(crate) fn means_table(
          all meshes are comparable; in parentheses are those over fewer, with their number \
          where some of the set have no such value, as an angle without a triangle. Across \
          different sets, compare the ratio: the geometric mean of the Hausdorff errors in \
-         relation to those of the named method, on the meshes where both reached the count.",
+         relation to those of the named method, on the meshes where both reached the count, with \
+         its 95 % interval over at least six meshes.",
         "Lengths in % of the bounding-box diagonal; wall-clock seconds. Arrows point in the better \
          direction. Bold: best of the means over all meshes.",
     ];
     Table {
         caption: MEANS.to_owned(),
         notes: (notes.into_iter().chain(rising_note).map(str::to_owned))
+            .chain(comparison.seeds_note())
             .chain(comparison.edition_note())
             .collect(),
         grouped: true,

@@ -15,15 +15,16 @@ use crate::journal::{check_regular, replace_file};
 use crate::overview::overview_table;
 use crate::page::{MeshPart, MeshView, Page};
 use crate::pictures::{FOLDER, PictureStrip, VIEWS, strips};
-use crate::plots::{Figure, mean_figures, mesh_figures};
+use crate::plots::{Figure, mean_figures, mesh_figures, profile_figures, profiles_csv};
 use crate::record::Record;
+use crate::statistics::{difference_tables, differences_csv};
 use crate::summary::{MEANS, by_count, means_table, native_curves, native_table};
 use crate::tables::{Table, mesh_table, to_csv, to_latex, to_markdown};
 use crate::text::file_stems;
 use crate::view3d::text_of;
 
 /// Writes the report of some records into a folder, which is created where it is missing:
-/// `results.csv`, `tables/*.md`, `tables/*.tex`, `tables/methods.*`, `plots/*.svg`, `header.json` and
+/// `results.csv`, `tables/*.md`, `tables/*.tex`, `tables/*.csv`, `tables/methods.*`, `plots/*.svg`, `header.json` and
 /// `index.html`. Returns the paths that were written, `index.html` last.
 ///
 /// Each file is written under a temporary name and renamed. The same records and header give the
@@ -64,7 +65,22 @@ pub fn write_report(
         files.write_tables("overview-purpose", "Which method?", answers.as_slice())?;
     }
 
-    let figures = mean_figures(&comparison, &summaries, &natives);
+    let differences = if is_one { vec![] } else { difference_tables(&comparison, &how) };
+    let profiles = profile_figures(&comparison);
+    if !differences.is_empty() {
+        files.write_tables("overview-differences", "Differences between methods", &differences)?;
+    }
+    if !is_one {
+        let csvs = [
+            ("tables/overview-differences.csv", differences_csv(&comparison)),
+            ("tables/overview-profiles.csv", profiles_csv(&profiles)),
+        ];
+        for (name, csv) in csvs {
+            files.write(name, &csv.map_err(|error| ReportError::content(name, error))?)?;
+        }
+    }
+    let mut figures = mean_figures(&comparison, &summaries, &natives);
+    figures.extend(profiles);
     files.write_plots(&figures)?;
 
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
@@ -103,6 +119,7 @@ pub fn write_report(
         *table = if is_one { known.of_one_mesh() } else { known };
     }
     let sections = [
+        ("differences", "Which differences are established?", differences),
         ("equal-error", "Equal error", equal_error),
         ("means", if is_one { "Native levels" } else { "Means over meshes" }, means),
     ];
@@ -263,9 +280,9 @@ impl Files<'_> {
                 // Files of the user, whose names begin otherwise, stay.
                 let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
                 let ours = (name.starts_with("mesh-") || name.starts_with("overview-"))
-                    && name
-                        .rsplit_once('.')
-                        .is_some_and(|(_, end)| ["md", "tex", "svg", "png", "js"].contains(&end));
+                    && name.rsplit_once('.').is_some_and(|(_, end)| {
+                        ["md", "tex", "csv", "svg", "png", "js"].contains(&end)
+                    });
                 if ours && !self.written.contains(&path) && !shown.contains(&path) {
                     fs::remove_file(&path).map_err(failed)?;
                 }

@@ -74,6 +74,10 @@ pub struct Arguments {
     /// Time each item N times, alternating between methods, and report the median [default: 1].
     #[arg(long, value_name = "N")]
     repeat: Option<usize>,
+    /// Run the methods that depend on a seed with N seeds, from `--seed` on. Their rows are those of the seed with the
+    /// median error; plots have the range as bars.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
+    seeds: Option<u64>,
     /// Run share I of N of the items; merge the folders by `medial report`.
     #[arg(long, value_name = "I/N")]
     shard: Option<String>,
@@ -224,6 +228,9 @@ struct Pages<'r> {
     due: [Instant; 2],
 }
 
+/// The largest number of seeds of a method.
+const MOST_SEEDS: u64 = 1_000;
+
 /// The least time between two pages, and between two with new pictures.
 const PAUSES: [Duration; 2] = [Duration::ZERO, Duration::from_secs(10)];
 
@@ -288,6 +295,9 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     study.threads = global.threads.or(study.threads);
     study.plugins.extend(global.plugins.iter().map(absolute));
     arguments.substrate.apply(&mut study)?;
+    if let Some(count) = arguments.seeds {
+        study.seeds = (0..count).map(|k| study.seed.wrapping_add(k)).collect();
+    }
     study.samples = arguments.measure.samples.unwrap_or(study.samples);
     Ok(study)
 }

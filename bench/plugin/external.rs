@@ -50,6 +50,7 @@ impl External {
             .extra(Capability::new("own_seconds", "seconds that the program measured by itself"))
             .extra(Capability::new("program_peak", "most resident bytes of the program"));
         info.native.clone_from(&declaration.native);
+        info.seeded = declaration.written.iter().any(|word| word.contains("{seed}"));
         if declaration.levels.contains(&LevelKind::Published) {
             info = info.published("what the program does without a level");
         }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use jiff::tz::TimeZone;
 use medial_reports::{
-    Header, MethodNote, Record, RunNote, Running, read_header, read_records, write_report,
+    Header, MethodNote, Record, RunNote, Running, Status, read_header, read_records, write_report,
 };
 use serde_json::json;
 
@@ -16,6 +16,7 @@ use crate::provenance::Provenance;
 use crate::store::{PAGE, RESULTS};
 use crate::study::Study;
 use crate::study::edition::Edition;
+use crate::study::external::GIVEN;
 use crate::study::item::Item;
 use crate::study::registry::Registry;
 
@@ -205,8 +206,10 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
     // Plug-ins that are not loaded this time keep their earlier descriptions.
     let ids: BTreeSet<&str> = records.iter().map(|r| r.simplify.method.as_str()).collect();
     // A merged or cleared store can list methods without records.
-    header.methods.retain(|method| ids.contains(method.id.as_str()));
-    let recorded = ids.into_iter().filter_map(|id| registry.entry(id));
+    header.methods.retain(|method| ids.contains(method.id.as_str()) && method.id != GIVEN);
+    // External results have notes of their own.
+    let ids = ids.into_iter().filter(|&id| id != GIVEN);
+    let recorded = ids.filter_map(|id| registry.entry(id));
     for entry in registry.entries().iter().chain(recorded) {
         let note = MethodNote::new(entry.method().info(), entry.presentation());
         match header.methods.iter_mut().find(|known| known.id == entry.id()) {
@@ -214,10 +217,44 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
             None => header.methods.push(note),
         }
     }
+    for record in records.iter().filter(|record| record.status == Status::External) {
+        let note = external_note(record);
+        header.methods.retain(|known| known.id != note.id);
+        header.methods.push(note);
+    }
     // In the order of the tables.
     header.methods.sort_by_key(|method| {
         let place = registry.entries().iter().position(|entry| entry.id() == method.id);
         place.unwrap_or(usize::MAX)
     });
     header
+}
+
+/// The note of external results: what their folder claims about the method.
+fn external_note(record: &Record) -> MethodNote {
+    let params = &record.simplify.params.0;
+    let claim = |key: &str| params.get(key).and_then(|value| value.as_str()).unwrap_or_default();
+    let citation = ["authors", "citation"].map(claim).into_iter().filter(|text| !text.is_empty());
+    let citation: Vec<&str> = citation.collect();
+    let mut summary = "External results, measured here.".to_owned();
+    for (words, key) in [("As claimed, run by", "run"), ("Claimed seconds are of", "machine")] {
+        let text = claim(key);
+        if !text.is_empty() {
+            summary += &format!(" {words}: {text}.");
+        }
+    }
+    let name = record.simplify.variant.clone().unwrap_or_default();
+    let title = match claim("title") {
+        "" => "a file of another program".to_owned(),
+        title => title.to_owned(),
+    };
+    let bibtex = claim("bibtex").to_owned();
+    MethodNote {
+        id: name,
+        title,
+        citation: citation.join(". "),
+        bibtex,
+        summary,
+        ..MethodNote::default()
+    }
 }

@@ -333,18 +333,32 @@ impl Edition {
         let place = |record: &Record| {
             (row(record), json!([record.mesh, record.simplify.level]).to_string())
         };
-        let found: BTreeMap<_, &Option<String>> = (records.iter())
+        let found: BTreeMap<_, &Record> = (records.iter())
             .filter(|record| record.simplify.variant.is_none())
-            .map(|record| (place(record), &record.result_hash))
+            .map(|record| (place(record), record))
             .collect();
         let mut repeated: BTreeMap<String, bool> = BTreeMap::new();
+        let mut ratios: Vec<f64> = vec![];
         for record in &frozen {
-            let is_same = found.get(&place(record)) == Some(&&record.result_hash);
-            *repeated.entry(row(record)).or_insert(true) &= is_same;
+            let own = found.get(&place(record));
+            let own = own.filter(|own| own.result_hash == record.result_hash);
+            *repeated.entry(row(record)).or_insert(true) &= own.is_some();
+            let total = |record: &Record| Some(record.simplify.seconds?.total).filter(|&s| s > 0.0);
+            let own = own.filter(|own| own.ran_alone() && own.simplify.method != INITIAL);
+            ratios.extend(own.and_then(|own| Some(total(own)? / total(record)?)));
         }
         frozen.retain(|record| !repeated[&row(record)]);
         records.extend(frozen);
         let mut notes = vec![];
+        if !ratios.is_empty() {
+            let mean = ratios.iter().map(|ratio| ratio.ln()).sum::<f64>() / ratios.len() as f64;
+            notes.push(format!(
+                "This machine takes {} times the seconds of edition {}: geometric mean over {} equal results.",
+                significant(mean.exp(), 2),
+                edition.name,
+                ratios.len()
+            ));
+        }
         let left_out: BTreeSet<&str> = others.iter().map(|record| record.mesh.as_str()).collect();
         let list = |names: Vec<String>| names.join(", ");
         if !left_out.is_empty() {

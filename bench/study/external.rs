@@ -89,14 +89,46 @@ impl ExternalResult {
 pub struct Claims {
     /// Full name of the method.
     pub title: String,
+    /// Who computed the results.
+    pub authors: String,
     /// Its source.
     pub citation: String,
+    /// The source as a BibTeX entry.
+    pub bibtex: String,
+    /// How it was run: program, version, options.
+    pub run: String,
+    /// The machine of the claimed seconds.
+    pub machine: String,
     /// Claimed seconds by the name of the file without its extension.
     pub seconds: BTreeMap<String, f64>,
 }
 
+impl Claims {
+    /// The first claim that cannot be shown.
+    fn fault(&self) -> Option<String> {
+        let seconds = self.seconds.iter().find(|(_, s)| !(s.is_finite() && **s >= 0.0));
+        if let Some((name, value)) = seconds {
+            return Some(format!(
+                "seconds of {name}: {value} is no time (expected a number from 0)"
+            ));
+        }
+        let entry = self.bibtex.trim();
+        let depth = entry.chars().try_fold(0_usize, |depth, c| match c {
+            '{' => Some(depth + 1),
+            '}' => depth.checked_sub(1),
+            _ => Some(depth),
+        });
+        let is_entry = entry.starts_with('@') && entry.ends_with('}') && depth == Some(0);
+        (!entry.is_empty() && !is_entry)
+            .then(|| "bibtex: expected one entry @type{key, ...} with balanced braces".to_owned())
+    }
+}
+
 /// Name of the file with [`Claims`].
 const CLAIMS: &str = "method.toml";
+/// Most bytes of it, and of a result; larger files are refused unread.
+const LARGEST_CLAIMS: u64 = 100_000;
+const LARGEST_RESULT: u64 = 200_000_000;
 /// Extensions of external results.
 const EXTENSIONS: [&str; 5] = ["ma", "ply", "off", "obj", "stl"];
 
@@ -116,14 +148,21 @@ impl ExternalResult {
     ) -> Result<(Vec<Self>, Claims), String> {
         let failed = |error: io::Error| format!("{}: {error}", folder.display());
         let path = folder.join(CLAIMS);
-        let claims = match check_regular(&path).and_then(|()| fs::read_to_string(&path)) {
+        let read = check_regular(&path).and_then(|()| {
+            check_size(&path, LARGEST_CLAIMS).map_err(io::Error::other)?;
+            fs::read_to_string(&path)
+        });
+        let claims: Claims = match read {
             Ok(text) => {
                 toml::from_str(&text).map_err(|why| format!("{}: {why}", path.display()))?
             }
             // Claims are optional, but a file that is there must be readable.
             Err(error) if error.kind() == io::ErrorKind::NotFound => Claims::default(),
-            Err(error) => return Err(failed(error)),
+            Err(error) => return Err(format!("{}: {error}", path.display())),
         };
+        if let Some(fault) = claims.fault() {
+            return Err(format!("{}: {fault}", path.display()));
+        }
         let mut files = Vec::new();
         for entry in fs::read_dir(folder).map_err(failed)? {
             let file = entry.map_err(failed)?.path();
@@ -173,9 +212,21 @@ medial::parameters! {
         /// Full name of the method, as claimed.
         #[serde(skip_serializing_if = "String::is_empty")]
         title: String = String::new(), "text";
+        /// Who computed the results, as claimed.
+        #[serde(skip_serializing_if = "String::is_empty")]
+        authors: String = String::new(), "text";
         /// Source of the method, as claimed.
         #[serde(skip_serializing_if = "String::is_empty")]
         citation: String = String::new(), "text";
+        /// The source as BibTeX, as claimed.
+        #[serde(skip_serializing_if = "String::is_empty")]
+        bibtex: String = String::new(), "text";
+        /// How it was run, as claimed.
+        #[serde(skip_serializing_if = "String::is_empty")]
+        run: String = String::new(), "text";
+        /// The machine of the seconds, as claimed.
+        #[serde(skip_serializing_if = "String::is_empty")]
+        machine: String = String::new(), "text";
         /// Seconds as claimed.
         #[serde(skip_serializing_if = "Option::is_none")]
         claimed_seconds: Option<f64> = None, "seconds";
@@ -309,7 +360,7 @@ impl Study {
         // The worker that reads it has another working folder.
         let path = std::path::absolute(&path).unwrap_or(path);
         // One read: the hash is that of the bytes whose spheres are counted.
-        let bytes = surface::content(&path).map_err(|error| given.refused(error))?;
+        let bytes = content(&path).map_err(|error| given.refused(error))?;
         let ExternalResult { fit, radii, lenient, block, .. } = given;
         let options = AxisOptions { lenient, block, radii, fit }.read_options();
         let loaded = read_external(&path, &bytes, options).map_err(|why| given.refused(why))?;
@@ -317,7 +368,7 @@ impl Study {
         if spheres == 0 {
             return Err(given.refused(format!("{}: no sphere", path.display())));
         }
-        let Claims { title, citation, seconds } = claims;
+        let Claims { title, authors, citation, bibtex, run, machine, seconds } = claims;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let claimed_seconds = seconds.get(&*stem).copied();
         let (file, same_as) = (path.to_string_lossy().into_owned().into(), String::new());
@@ -328,7 +379,11 @@ impl Study {
             lenient,
             block,
             title,
+            authors,
             citation,
+            bibtex,
+            run,
+            machine,
             claimed_seconds,
             same_as,
         };
@@ -470,7 +525,7 @@ pub fn read_axis(
 ) -> Result<(LoadedMa, Option<Fit>), AxisError> {
     let named = |why: &dyn Display| AxisError(format!("{}: {why}", path.display()));
     let from_surface = options.radii == RadiiFrom::Surface;
-    let bytes = surface::content(path).map_err(|error| AxisError(error.to_string()))?;
+    let bytes = content(path).map_err(AxisError)?;
     let mut loaded = read_external(path, &bytes, options.read_options()).map_err(AxisError)?;
     if loaded.mesh.spheres.is_empty() {
         return Err(named(&"no sphere"));
@@ -502,6 +557,19 @@ pub fn read_axis(
         loaded.warnings.extend(doubts.map(|doubt| format!("{}: {doubt}", path.display())));
     }
     Ok((loaded, fit))
+}
+
+/// Refuses a file by its size, before it is read.
+fn check_size(path: &Path, most: u64) -> Result<(), String> {
+    let bytes = fs::metadata(path).map_or(0, |file| file.len());
+    let fault = format!("too large (found {bytes} bytes, expected at most {most})");
+    if bytes > most { Err(fault) } else { Ok(()) }
+}
+
+/// The bytes of an external result.
+fn content(path: &Path) -> Result<Vec<u8>, String> {
+    check_size(path, LARGEST_RESULT).map_err(|why| format!("{}: {why}", path.display()))?;
+    surface::content(path).map_err(|error| error.to_string())
 }
 
 /// Reads a medial mesh, or a surface as spheres of radius 0: the union of its slabs is the surface

@@ -80,6 +80,9 @@ pub struct Study {
     pub published: bool,
     /// Seed of every random choice.
     pub seed: u64,
+    /// Seeds of the methods that depend on one [default: `seed`].
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub seeds: Vec<u64>,
     /// Number of timed repetitions of each level.
     pub repeat: usize,
     /// Boundary samples.
@@ -169,6 +172,7 @@ impl Default for Study {
             counts_only: false,
             published: false,
             seed: 0,
+            seeds: vec![],
             repeat: 1,
             sampling: Sampling::default(),
             dual: Dual::default(),
@@ -425,7 +429,10 @@ impl Study {
                     let spec = MethodSpec { id, name, params, fingerprint };
                     let (levels, version) =
                         (self.levels(method, entry), entry.version(&here.binary_hash));
-                    items.push(self.item(scene.clone(), spec, levels, version, here));
+                    let item = self.item(scene.clone(), spec, levels, version, here);
+                    let is_seeded = entry.method().info().seeded && !self.seeds.is_empty();
+                    let seeds = if is_seeded { &self.seeds[..] } else { &[self.seed] };
+                    items.extend(seeds.iter().map(|&seed| Item { seed, ..item.clone() }));
                 }
             }
             let of_mesh = files.iter().filter(|file| file.mesh == scene.mesh);

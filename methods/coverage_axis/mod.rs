@@ -85,6 +85,7 @@ pub struct CoverageAxis {
 /// Supports all levels but an error bound. Memory: one bit for each candidate and sample.
 pub fn method(keeping: Keeping) -> CoverageAxis {
     let info = MethodInfo::new("coverage-axis", "Coverage Axis++")
+        .seeded()
         .citation(
             "Zhiyang Dou, Cheng Lin, Rui Xu, Lei Yang, Shiqing Xin, Taku Komura, Wenping Wang 2022. \
              Coverage Axis: Inner Point Selection for 3D Shape Skeletonization. Computer Graphics \

@@ -62,6 +62,7 @@ const LARGEST_SCALE: f64 = 1e6;
 /// Has all levels. Each scale costs one regular and one Delaunay triangulation.
 pub fn method() -> Method<SatParams> {
     let info = MethodInfo::new("sat", "Scale axis transform")
+        .seeded()
         .citation(
             "Joachim Giesen, Balint Miklos, Mark Pauly, Camille Wormser 2009. The scale axis \
              transform. Symposium on Computational Geometry. \

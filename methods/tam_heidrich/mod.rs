@@ -125,6 +125,7 @@ pub struct PartInfo {
 /// Supports all levels. The axis is computed once for all; a level costs a few passes over it.
 pub fn method() -> Method<TamHeidrichParams> {
     let info = MethodInfo::new("tam-heidrich", "Tam-Heidrich part pruning")
+        .seeded()
         .citation(
             "Roger Tam, Wolfgang Heidrich 2003. Shape simplification based on the medial axis \
              transform. IEEE Visualization. https://doi.org/10.1109/VISUAL.2003.1250410",

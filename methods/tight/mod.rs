@@ -103,6 +103,7 @@ pub struct Tight {
 /// [`Level::Native`], a bound of the two-sided error, at two to three times that.
 pub fn method(starter: impl MedialSimplifier + 'static) -> Tight {
     let info = MethodInfo::new("tight", "Tight")
+        .seeded()
         .citation("This project; not published.")
         .summary(
             "Collapses and inserts spheres in the order of the two-sided error at samples, and moves all \

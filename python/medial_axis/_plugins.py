@@ -52,6 +52,7 @@ def describe(cls: Any) -> str:
             "published": info.published,
             "on_request": bool(info.on_request),
             "incremental": bool(info.incremental),
+            "seeded": bool(info.seeded),
         }
     )
 

@@ -56,6 +56,8 @@ class MethodInfo:
     incremental: bool = False
     """Whether `at` continues from the previous level. Levels are then requested from fine to coarse, and the seconds
     of a level are those of all calls up to it."""
+    seeded: bool = False
+    """Whether results depend on `RunContext.seed`."""
 
 
 @dataclass(frozen=True)

@@ -101,6 +101,7 @@ struct Described {
     published: Option<String>,
     on_request: bool,
     incremental: bool,
+    seeded: bool,
 }
 
 impl ClassMethod {
@@ -120,13 +121,21 @@ impl ClassMethod {
 
 impl From<Described> for MethodInfo {
     fn from(described: Described) -> Self {
-        let info = Self::new(described.id, described.title)
-            .citation(described.citation)
-            .summary(described.summary)
-            .params(described.params);
-        let (native, incremental) = (described.native, described.incremental);
-        let info = Self { native, incremental, ..info };
-        match described.published {
+        let Described {
+            id,
+            title,
+            citation,
+            summary,
+            native,
+            params,
+            published,
+            incremental,
+            seeded,
+            ..
+        } = described;
+        let info = Self::new(id, title).citation(citation).summary(summary).params(params);
+        let info = Self { native, incremental, seeded, ..info };
+        match published {
             Some(published) => info.published(published),
             None => info,
         }

@@ -202,6 +202,7 @@ impl Page<'_> {
             "running": header.running,
             "alert": self.alert(),
             "notices": (comparison.edition_note().into_iter())
+                .chain(comparison.seeds_note())
                 .chain(header.notes.iter().cloned())
                 .chain(comparison.cautions())
                 .collect::<Vec<_>>(),

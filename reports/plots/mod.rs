@@ -4,17 +4,18 @@
 //! labels.
 
 mod axis;
+mod profiles;
 mod svg;
 
 use serde_json::{Value, json};
 
-use crate::comparison::{Comparison, reached, rises};
+use crate::comparison::{Comparison, Entry, reached, rises};
 use crate::metric::{HAUSDORFF, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS};
-use crate::record::Record;
 use crate::summary::{CountSummary, NativeCurve};
 use crate::text::{grouped, significant};
 
 pub(crate) use self::axis::Scale;
+pub(crate) use self::profiles::{profile_figures, profiles_csv};
 pub(crate) use self::svg::symbol;
 
 /// A figure before it is drawn. Its horizontal axis is logarithmic.
@@ -27,6 +28,8 @@ pub(crate) struct Figure {
     pub(crate) curves: Vec<Curve>,
     /// Whether the page shows it unfolded.
     pub(crate) leading: bool,
+    /// Whether values hold from a point to the next one; few points have a marker then.
+    pub(crate) steps: bool,
 }
 
 /// The points of one series.
@@ -56,6 +59,8 @@ pub(crate) struct Point {
     pub(crate) tag: Option<String>,
     /// Whether it is an error above one of fewer spheres.
     pub(crate) rising: bool,
+    /// The ends of a bar: a 95 % interval over meshes, or the range over seeds.
+    pub(crate) bar: Option<[f64; 2]>,
 }
 
 impl Figure {
@@ -66,7 +71,8 @@ impl Figure {
             let points = curve.points.iter().map(|point| {
                 let [x, y] = [point.x, point.y].map(rounded);
                 let is_rising = u8::from(point.rising);
-                json!([x, y, point.n, point.spheres.map(rounded), point.tag, is_rising])
+                let bar = point.bar.map(|ends| ends.map(rounded));
+                json!([x, y, point.n, point.spheres.map(rounded), point.tag, is_rising, bar])
             });
             json!({
                 "series": curve.series, "label": curve.label, "name": curve.name, "of": curve.of,
@@ -74,7 +80,7 @@ impl Figure {
             })
         });
         json!({
-            "title": self.title, "leading": self.leading,
+            "title": self.title, "leading": self.leading, "steps": self.steps,
             "x": {"title": self.x, "scale": Scale::Log}, "y": {"title": self.y.0, "scale": self.y.1},
             "curves": curves.collect::<Vec<_>>(),
         })
@@ -120,10 +126,11 @@ impl Kind {
             y: (y.to_owned(), scale),
             curves,
             leading: matches!(*name, "hausdorff" | "time"),
+            steps: false,
         })
     }
 
-    /// A curve of results or means: spheres, seconds and y of each, and the number of meshes behind it. Over time both
+    /// A curve of results or means. Over time both
     /// ends are tagged with their number of spheres, which no axis shows. Dashes are at native levels, where an error that
     /// rises has no mark.
     fn curve(
@@ -131,18 +138,18 @@ impl Kind {
         series: usize,
         (name, of): (&str, &str),
         dashed: bool,
-        points: impl IntoIterator<Item = (f64, Option<f64>, Option<f64>, usize)>,
+        points: impl IntoIterator<Item = Place>,
     ) -> Curve {
-        let points: Vec<_> = points.into_iter().collect();
+        let points: Vec<Place> = points.into_iter().collect();
         let mut errors: Vec<(f64, f64)> =
-            points.iter().filter_map(|&(spheres, _, y, _)| Some((spheres, y?))).collect();
+            points.iter().filter_map(|place| Some((place.spheres, place.y?))).collect();
         errors.retain(|_| self.is_error() && !dashed);
         let mut points: Vec<Point> = (points.into_iter())
-            .filter_map(|(spheres, seconds, y, n)| {
+            .filter_map(|Place { spheres, seconds, y, n, bar }| {
                 let rising = rises((spheres, y?), &errors);
                 let (x, spheres) =
                     if self.is_over_time() { (seconds?, Some(spheres)) } else { (spheres, None) };
-                Some(Point { x, y: y?, n: Some(n), spheres, tag: None, rising })
+                Some(Point { x, y: y?, n: Some(n), spheres, tag: None, rising, bar })
             })
             .collect();
         for k in [0, points.len().saturating_sub(1)] {
@@ -155,6 +162,15 @@ impl Kind {
     }
 }
 
+/// A result or a mean before it is a point: the number of meshes behind it, and the ends of its bar.
+struct Place {
+    spheres: f64,
+    seconds: Option<f64>,
+    y: Option<f64>,
+    n: usize,
+    bar: Option<[f64; 2]>,
+}
+
 /// The figures of one mesh: every measured result of each method, from many spheres to few. Those at counts and error
 /// bounds are a line, those at native levels dashes.
 pub(crate) fn mesh_figures(comparison: &Comparison<'_>, mesh: usize, stem: &str) -> Vec<Figure> {
@@ -162,14 +178,16 @@ pub(crate) fn mesh_figures(comparison: &Comparison<'_>, mesh: usize, stem: &str)
     for kind in &KINDS {
         let mut curves: Vec<Curve> = vec![];
         for (series, dashed) in (0..comparison.series.len()).flat_map(|s| [(s, false), (s, true)]) {
-            let mut records: Vec<&Record> = (comparison.of_mesh(mesh))
+            let mut entries: Vec<&Entry<'_>> = (comparison.of_mesh(mesh))
                 .filter(|entry| entry.series == series && entry.measured())
-                .map(|entry| entry.record)
-                .filter(|record| record.simplify.level.is_native() == dashed)
+                .filter(|entry| entry.record.simplify.level.is_native() == dashed)
                 .collect();
-            records.sort_by_key(|record| std::cmp::Reverse(reached(record)));
-            let points = records.into_iter().filter_map(|record| {
-                Some((reached(record)? as f64, TOTAL_SECONDS.of(record), kind.2.of(record), 1))
+            entries.sort_by_key(|entry| std::cmp::Reverse(reached(entry.record)));
+            let points = entries.into_iter().filter_map(|entry| {
+                let record = entry.record;
+                let spheres = reached(record)? as f64;
+                let (seconds, y) = (TOTAL_SECONDS.of(record), kind.2.of(record));
+                Some(Place { spheres, seconds, y, n: 1, bar: comparison.range(entry, kind.2) })
             });
             let names = (&*comparison.series[series], &*comparison.meshes[mesh]);
             let mut curve = kind.curve(series, names, dashed, points);
@@ -204,7 +222,7 @@ pub(crate) fn mean_figures(
                     "mean" => Some(point.mean),
                     _ => None,
                 };
-                (point.spheres, None, y, native.over)
+                Place { spheres: point.spheres, seconds: None, y, n: native.over, bar: None }
             });
             let mut curve = kind.curve(series, (&name, "mean"), true, points);
             if !curves[series].points.is_empty() {
@@ -233,7 +251,8 @@ fn mean_curve(
         if over != summary.meshes {
             label = format!("{name} ({over} of {})", summary.meshes);
         }
-        Some((summary.count as f64, row.mean(&TOTAL_SECONDS), Some(y), over))
+        let (spheres, seconds) = (summary.count as f64, row.mean(&TOTAL_SECONDS));
+        Some(Place { spheres, seconds, y: Some(y), n: over, bar: row.interval(kind.2) })
     });
     let curve = kind.curve(series, (name, "mean"), false, points);
     Curve { label, ..curve }

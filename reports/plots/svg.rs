@@ -77,7 +77,8 @@ impl Figure {
     pub(crate) fn to_svg(&self) -> Result<Option<String>, ReportError> {
         let points: Vec<&Point> = self.curves.iter().flat_map(|curve| &curve.points).collect();
         let x = Axis::fit(Scale::Log, points.iter().map(|point| point.x));
-        let y = Axis::fit(self.y.1, points.iter().map(|point| point.y));
+        let bars = points.iter().flat_map(|point| point.bar.into_iter().flatten());
+        let y = Axis::fit(self.y.1, points.iter().map(|point| point.y).chain(bars));
         let (Some(x), Some(y)) = (x, y) else { return Ok(None) };
         let rows = self.curves.iter().filter(|curve| !curve.label.is_empty()).count() + 1;
         let size = (WIDTH as u32, HEIGHT.max(rows as i32 * LEGEND_ROW + 120) as u32);
@@ -121,14 +122,28 @@ impl Figure {
         let mut taken = Vec::new(); // shared by all curves: tags of two must not meet
         for curve in &self.curves {
             let stroke = colour(curve.series).stroke_width(4);
-            let line = curve.points.iter().map(|point| (point.x, point.y));
+            let mut line: Vec<(f64, f64)> = vec![];
+            for Point { x, y, .. } in &curve.points {
+                // A share holds until the next value.
+                line.extend(line.last().filter(|_| self.steps).map(|last| (*x, last.1)));
+                line.push((*x, *y));
+            }
             if curve.dashed {
                 let dashes = DashedLineSeries::new(line, 14, 10, stroke);
                 chart.draw_series(dashes)?;
             } else {
                 chart.draw_series(LineSeries::new(line, stroke))?;
             }
-            for point in &curve.points {
+            // Enough to distinguish the curves without colour.
+            let every = if self.steps { curve.points.len().div_ceil(6) } else { 1 };
+            for point in curve.points.iter().skip(every - 1).step_by(every) {
+                if let Some([low, high]) = point.bar {
+                    let ends = vec![(point.x, low), (point.x, high)];
+                    chart.draw_series([PathElement::new(
+                        ends,
+                        colour(curve.series).stroke_width(2),
+                    )])?;
+                }
                 let (left, top) = chart.backend_coord(&(point.x, point.y));
                 // Relative to the plot, without its margins.
                 let at = (left - inner.get_base_pixel().0, top - inner.get_base_pixel().1);

@@ -15,7 +15,7 @@ use crate::text::printable;
 
 /// Columns that every table has, before those of [`METRICS`] and after them. Further ones follow by
 /// name.
-const FIRST: &str = "mesh dataset mesh_hash method params seed level asked status reason comparable \
+const FIRST: &str = "mesh dataset mesh_hash row method params seed level asked status reason comparable \
     reached native_level spheres edges faces peak_bytes threads seconds_substrate seconds_prepare \
     seconds_simplify seconds_total cpu_seconds_substrate cpu_seconds_prepare cpu_seconds_simplify \
     cpu_seconds_total";
@@ -89,7 +89,11 @@ fn descend(path: String, value: Value, values: &mut Vec<(String, Value)>) {
 
 /// A CSV with a header line. Each row has the command that made it.
 pub(crate) fn to_csv(comparison: &Comparison<'_>) -> Result<Vec<u8>, csv::Error> {
-    let rows: Vec<BTreeMap<String, String>> = comparison.entries.iter().map(row).collect();
+    let with_seeds = comparison.entries.iter().flat_map(|entry| {
+        comparison.records_of(entry).iter().map(|&record| Entry { record, ..*entry })
+    });
+    let rows: Vec<BTreeMap<String, String>> =
+        with_seeds.map(|entry| row(comparison, &entry)).collect();
     let evaluated = METRICS.iter().filter(|metric| matches!(metric.value, Place::Evaluation(_)));
     let mut columns: Vec<&str> = FIRST
         .split_whitespace()
@@ -109,7 +113,7 @@ pub(crate) fn to_csv(comparison: &Comparison<'_>) -> Result<Vec<u8>, csv::Error>
 }
 
 /// The cells of a row by the names of their columns.
-fn row(entry: &Entry<'_>) -> BTreeMap<String, String> {
+fn row(comparison: &Comparison<'_>, entry: &Entry<'_>) -> BTreeMap<String, String> {
     let record = entry.record;
     let simplify = &record.simplify;
     let (level, requested) = match simplify.level {
@@ -119,6 +123,7 @@ fn row(entry: &Entry<'_>) -> BTreeMap<String, String> {
         Target::MaxError(value) => ("max_error", value.to_string()),
     };
     let mut row: BTreeMap<String, String> = [
+        ("row", comparison.series[entry.series].clone()),
         ("level", level.to_owned()),
         ("asked", requested),
         ("comparable", entry.comparable().to_string()),

@@ -90,6 +90,13 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
             None => Cell::optional(None),
         });
     }
+    let has_seeds = entries.iter().any(|entry| comparison.range(entry, &HAUSDORFF).is_some());
+    if has_seeds {
+        rows = rows.text("Hausdorff over seeds", |entry| {
+            let range = comparison.range(entry, &HAUSDORFF);
+            Cell::optional(range.map(|ends| ends.map(|end| HAUSDORFF.format(end)).join(" to ")))
+        });
+    }
     rows = rows.text("Betti", |entry| {
         let evaluation = entry.record.evaluate.as_ref();
         Cell::optional(evaluation.map(|evaluation| betti(Some(evaluation.betti))))
@@ -111,6 +118,7 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
     if entries.iter().any(|entry| comparison.is_rising(entry)) {
         notes.push(RISING_NOTE.to_owned());
     }
+    notes.extend(comparison.seeds_note());
     notes.extend(comparison.edition_note());
     Table {
         caption: format!("{}: every method at every level", comparison.meshes[mesh]),

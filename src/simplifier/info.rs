@@ -40,6 +40,8 @@ pub struct MethodInfo {
     /// from fine to coarse, with levels of one kind after one preparation, and the seconds of a level
     /// are those of all calls up to it. The seconds of other methods are those of each call alone.
     pub incremental: bool,
+    /// Whether results depend on [`RunContext::seed`](crate::simplifier::RunContext::seed).
+    pub seeded: bool,
     /// Whether there is one result for each shape, at [`Level::Published`](crate::simplifier::Level::Published)
     /// alone.
     pub fixed: bool,
@@ -76,6 +78,11 @@ impl MethodInfo {
     /// With [`MethodInfo::native`].
     pub fn native(self, native: NativeLevel) -> Self {
         Self { native: Some(native), ..self }
+    }
+
+    /// With [`MethodInfo::seeded`]: results depend on the seed.
+    pub fn seeded(self) -> Self {
+        Self { seeded: true, ..self }
     }
 
     /// With [`MethodInfo::incremental`]: levels continue from the previous one.

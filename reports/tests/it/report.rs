@@ -530,6 +530,75 @@ fn the_bibliography_has_each_method_that_ran_once() {
 }
 
 #[test]
+fn seeds_are_one_row_of_the_median_error() {
+    let mut records = vec![];
+    for (shape, mesh) in SHAPES.iter().enumerate() {
+        records.push(with_error(ok(mesh, "qmat", 100, shape, 0), 0.02));
+        for (seed, error) in [(0, 0.009), (1, 0.012), (2, 0.010)] {
+            let mut record = with_error(ok(mesh, "tight", 100, shape, 1), error);
+            record.simplify.seed = seed;
+            record.seeds = [("evaluation".to_owned(), 0), ("method".to_owned(), seed)].into();
+            records.push(record);
+        }
+    }
+    records
+        .iter_mut()
+        .for_each(|record| _ = record.seeds.entry("evaluation".to_owned()).or_insert(0));
+    let files = report_of(&records);
+    let table = text(&files, "tables/mesh-bear.md");
+    let row = table.lines().find(|line| line.contains("| tight |")).unwrap();
+    assert!(row.contains("1.00") && row.contains("0.900 to 1.20"), "{row}");
+    assert_eq!(table.matches("| tight |").count(), 1, "{table}");
+    // Every seed is in the CSV.
+    assert_eq!(text(&files, "results.csv").lines().count(), 1 + 4 * SHAPES.len());
+    let differences = text(&files, "tables/overview-differences.md");
+    let row = differences.lines().find(|line| line.starts_with("| qmat |")).unwrap();
+    // Worse on all of 13 meshes: the sign of each is a fair coin.
+    let p = 2.0 / 2f64.powi(13);
+    assert!(row.contains("| 2.0 \\[2.0, 2.0\\] | 13 | 0, 0, 13 | -1.00 |"), "{row}");
+    let csv = text(&files, "tables/overview-differences.csv");
+    assert!(csv.contains(&format!(",{p},{p}")), "{csv}");
+    let purpose = text(&files, "tables/overview-purpose.md");
+    assert!(purpose.contains("| yes, n = 13 |"), "{purpose}");
+}
+
+#[test]
+fn few_meshes_establish_nothing() {
+    let pair = |mesh: &str, shape| {
+        [("qmat", 0.02), ("tight", 0.01)].map(|(id, e)| with_error(ok(mesh, id, 100, shape, 0), e))
+    };
+    let records: Vec<Record> =
+        SHAPES[..5].iter().enumerate().flat_map(|(shape, mesh)| pair(mesh, shape)).collect();
+    let files = report_of(&records);
+    let differences = text(&files, "tables/overview-differences.md");
+    assert!(differences.contains("no difference can be established"), "{differences}");
+    assert!(differences.contains("| qmat | 2.0 | 5 |"), "without an interval: {differences}");
+    let purpose = text(&files, "tables/overview-purpose.md");
+    assert!(purpose.contains("no, n = 5 is too few"), "{purpose}");
+}
+
+#[test]
+fn shares_of_targets_count_each_mesh_and_target() {
+    let records: Vec<Record> = SHAPES[..2]
+        .iter()
+        .enumerate()
+        .flat_map(|(shape, mesh)| {
+            [(200, 0.004), (100, 0.02)].map(|(n, e)| with_error(ok(mesh, "qmat", n, shape, 0), e))
+        })
+        .collect();
+    let files = report_of(&records);
+    let csv = text(&files, "tables/overview-profiles.csv");
+    // Of eight targets, 5, 3 and 2 % with 100 spheres, and 1 and 0.5 % with 200.
+    for row in [
+        "targets-spheres,qmat,100,0.375,16",
+        "targets-spheres,qmat,200,0.625,16",
+        "profile,qmat,1,1,2",
+    ] {
+        assert!(csv.contains(row), "{csv}");
+    }
+}
+
+#[test]
 fn a_page_of_one_mesh_counts_no_meshes() {
     let report = |shapes: &[&str]| {
         let files = report_of(&comparison(shapes, &METHODS, &COUNTS));
@@ -538,7 +607,7 @@ fn a_page_of_one_mesh_counts_no_meshes() {
         report
     };
     let [one, two] = [&SHAPES[..1], &SHAPES[..2]].map(report);
-    for (page, columns) in [(&one, 6), (&two, 7)] {
+    for (page, columns) in [(&one, 6), (&two, 8)] {
         assert_eq!(page["answers"]["columns"].as_array().unwrap().len(), columns);
     }
     let sections = |page: &serde_json::Value| {

@@ -1,0 +1,356 @@
+//! Which differences between methods are established: paired tests over meshes, and intervals of ratios.
+//!
+//! Two methods are compared on the meshes that both ran on, by the logarithm of the ratio of their values. A missing result
+//! counts as infinite, so it is among the largest differences; meshes where both have none, or equal values, have no sign.
+//!
+//! 1. Wilcoxon, 1945, "Individual comparisons by ranking methods": the signed-rank test, two-sided. The distribution of the
+//!    rank sum is exact, also for ties; above [`MOST_EXACT`] differences it is the normal one with Pratt's tie correction.
+//! 2. Holm, 1979, "A simple sequentially rejective multiple test procedure": p-values for all pairs of methods.
+//! 3. Efron, 1979, "Bootstrap methods": percentiles of the geometric mean over resampled meshes.
+//!
+//! `scripts/check_statistics.py` computes the same with SciPy.
+
+use crate::answers::{Values, errors_at, ranked};
+use crate::comparison::Comparison;
+use crate::tables::{Cell, Table};
+use crate::text::{counted, significant};
+
+/// Probability of calling any difference of a table established although there is none.
+const LEVEL: f64 = 0.05;
+
+/// Meshes that a test and an interval need: with fewer, no two-sided test reaches [`LEVEL`].
+pub(crate) const FEWEST: usize = 6;
+
+/// Differences up to which the rank sum has its exact distribution.
+const MOST_EXACT: usize = 100;
+
+/// Resampled sets of meshes for an interval, and their seed.
+const RESAMPLES: usize = 2_000;
+const SEED: u64 = 0;
+
+/// Two methods on the meshes that both ran on.
+#[derive(Clone, Debug)]
+pub(crate) struct Paired {
+    /// Meshes where the first has the smaller value, where both are equal, and where it has the larger one.
+    pub(crate) outcomes: [usize; 3],
+    /// Geometric mean of the ratios of the first to the second, over the meshes where both have a result.
+    pub(crate) ratio: Option<f64>,
+    /// Its 95 % interval.
+    pub(crate) interval: Option<[f64; 2]>,
+    /// Share of the rank sum in favour of the first minus that in favour of the second.
+    pub(crate) effect: f64,
+    /// Probability of a rank sum at least as extreme if no method is better.
+    pub(crate) p: f64,
+    /// The same, corrected for all pairs of the table.
+    pub(crate) corrected: f64,
+}
+
+impl Paired {
+    fn of(first: &Values, second: &Values) -> Self {
+        let pairs = first.iter().zip(second).filter_map(|(a, b)| Some([(*a)?.value, (*b)?.value]));
+        // Where both have no result the mesh tells nothing. A perfect result is zero and has no logarithm.
+        let pairs = pairs.filter(|[a, b]| a.is_finite() || b.is_finite());
+        let differences: Vec<f64> = pairs
+            .map(|[a, b]| if a == b { 0.0 } else { a.max(1e-9).ln() - b.max(1e-9).ln() })
+            .collect();
+        let count = |is: fn(&f64) -> bool| differences.iter().filter(|d| is(d)).count();
+        let outcomes = [count(|&d| d < 0.0), count(|&d| d == 0.0), count(|&d| d > 0.0)];
+        let finite: Vec<f64> = differences.iter().copied().filter(|d| d.is_finite()).collect();
+        let ratio = (!finite.is_empty()).then(|| mean(&finite).exp());
+        let (effect, p) = signed_ranks(&differences);
+        Self { outcomes, ratio, interval: interval_of_logs(&finite), effect, p, corrected: p }
+    }
+
+    /// The second in relation to the first.
+    fn inverse(mut self) -> Self {
+        self.outcomes.reverse();
+        let ratio = self.ratio.map(f64::recip);
+        let interval = self.interval.map(|[low, high]| [high.recip(), low.recip()]);
+        Self { ratio, interval, effect: 0.0 - self.effect, ..self }
+    }
+
+    /// Meshes with a result of either.
+    pub(crate) fn meshes(&self) -> usize {
+        self.outcomes.iter().sum()
+    }
+
+    /// Whether the difference is larger than chance explains.
+    pub(crate) fn is_established(&self) -> bool {
+        self.meshes() >= FEWEST && self.corrected < LEVEL
+    }
+
+    /// The ratio with its interval: `0.30 [0.25, 0.36]`.
+    pub(crate) fn ratio_text(&self) -> Option<String> {
+        let ratio = significant(self.ratio?, 2);
+        Some(match self.interval.map(|ends| ends.map(|end| significant(end, 2))) {
+            Some([low, high]) => format!("{ratio} [{low}, {high}]"),
+            None => ratio,
+        })
+    }
+}
+
+/// All pairs of some methods, with corrected p-values.
+pub(crate) struct Pairs {
+    series: Vec<usize>,
+    /// By rows: the first method with each later one.
+    pairs: Vec<Paired>,
+}
+
+impl Pairs {
+    /// The pairs of some series, with the values of all series.
+    pub(crate) fn of(series: Vec<usize>, values: &[Values]) -> Self {
+        let firsts = series.iter().enumerate();
+        let pairs = firsts.flat_map(|(k, &a)| series[k + 1..].iter().map(move |&b| (a, b)));
+        let mut pairs: Vec<Paired> =
+            pairs.map(|(a, b)| Paired::of(&values[a], &values[b])).collect();
+        let corrected = holm(&pairs.iter().map(|pair| pair.p).collect::<Vec<_>>());
+        pairs.iter_mut().zip(corrected).for_each(|(pair, p)| pair.corrected = p);
+        Self { series, pairs }
+    }
+
+    /// One of the series in relation to another one; `None` for itself and for others.
+    pub(crate) fn between(&self, a: usize, b: usize) -> Option<Paired> {
+        let place = |series| self.series.iter().position(|&other| other == series);
+        let [low, high] = [place(a)?.min(place(b)?), place(a)?.max(place(b)?)];
+        let size = self.series.len();
+        let pair = (low < high)
+            .then(|| self.pairs[low * (2 * size - low - 1) / 2 + high - low - 1].clone())?;
+        Some(if self.series[low] == a { pair } else { pair.inverse() })
+    }
+
+    /// The series that one is not established to differ from.
+    fn alike(&self, a: usize) -> Vec<usize> {
+        let is_alike = |b: &usize| self.between(a, *b).is_some_and(|pair| !pair.is_established());
+        self.series.iter().copied().filter(is_alike).collect()
+    }
+}
+
+/// The effect and the two-sided p-value of the signed-rank test. Zeros are left out.
+fn signed_ranks(differences: &[f64]) -> (f64, f64) {
+    let mut sorted: Vec<f64> = differences.iter().copied().filter(|&d| d != 0.0).collect();
+    sorted.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let size = sorted.len();
+    // Twice the ranks, so that the mean rank of a tie is whole.
+    let (mut ranks, mut ties) = (Vec::with_capacity(size), 0.0);
+    for tie in sorted.chunk_by(|a, b| a.abs() == b.abs()) {
+        let (before, length) = (ranks.len(), tie.len());
+        ranks.extend(std::iter::repeat_n(2 * before + length + 1, length));
+        ties += (length * length * length - length) as f64;
+    }
+    let total: usize = ranks.iter().sum();
+    if total == 0 {
+        return (0.0, 1.0);
+    }
+    let positive: usize =
+        sorted.iter().zip(&ranks).filter(|(d, _)| **d > 0.0).map(|(_, r)| r).sum();
+    let effect = 1.0 - 2.0 * positive as f64 / total as f64;
+    if size > MOST_EXACT {
+        let n = size as f64;
+        let variance = n * (n + 1.0) * (2.0 * n + 1.0) / 24.0 - ties / 48.0;
+        let z = (positive as f64 - total as f64 / 2.0).abs() / 2.0 / variance.sqrt();
+        return (effect, libm::erfc(z / std::f64::consts::SQRT_2));
+    }
+    // Probability of each sum when signs are fair coins.
+    let mut sums = vec![0.0; total + 1];
+    sums[0] = 1.0;
+    let mut reach = 0;
+    for rank in ranks {
+        reach += rank;
+        for sum in (0..=reach).rev() {
+            sums[sum] = 0.5 * (sums[sum] + if sum >= rank { sums[sum - rank] } else { 0.0 });
+        }
+    }
+    let tail = |range: &[f64]| range.iter().sum::<f64>();
+    (effect, (2.0 * tail(&sums[..=positive]).min(tail(&sums[positive..]))).min(1.0))
+}
+
+/// p-values corrected for their number by Holm's step-down procedure.
+fn holm(p: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..p.len()).collect();
+    order.sort_by(|&a, &b| p[a].total_cmp(&p[b]));
+    let (mut corrected, mut largest) = (vec![0.0; p.len()], 0.0f64);
+    for (k, &i) in order.iter().enumerate() {
+        largest = largest.max((p.len() - k) as f64 * p[i]).min(1.0);
+        corrected[i] = largest;
+    }
+    corrected
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// The 95 % interval of a geometric mean over meshes; `None` of fewer than [`FEWEST`] positive values.
+pub(crate) fn interval(values: &[f64]) -> Option<[f64; 2]> {
+    let logs: Vec<f64> = values.iter().filter(|v| **v > 0.0).map(|value| value.ln()).collect();
+    interval_of_logs(&logs)
+}
+
+fn interval_of_logs(logs: &[f64]) -> Option<[f64; 2]> {
+    (logs.len() >= FEWEST).then(|| {
+        // SplitMix64 of Steele et al., 2014: a few lines in any language repeat it.
+        let mut state = SEED;
+        let mut below = |size: usize| {
+            state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+            let mut z = (state ^ (state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+            ((u128::from(z ^ (z >> 31)) * size as u128) >> 64) as usize
+        };
+        let mut means: Vec<f64> = (0..RESAMPLES)
+            .map(|_| {
+                (0..logs.len()).map(|_| logs[below(logs.len())]).sum::<f64>() / logs.len() as f64
+            })
+            .collect();
+        means.sort_by(f64::total_cmp);
+        [0.025, 0.975].map(|share| {
+            let place = share * (RESAMPLES - 1) as f64;
+            let (low, part) = (means[place as usize], place.fract());
+            (low + part * (means[place as usize + 1] - low)).exp()
+        })
+    })
+}
+
+/// The methods at each number of spheres, the best median error first, with all pairs.
+fn rankings(comparison: &Comparison<'_>) -> Vec<(usize, Pairs)> {
+    let of_count = |(level, spheres)| {
+        let values = errors_at(comparison, level);
+        let series: Vec<usize> = ranked(&values).iter().map(|rank| rank.series).collect();
+        (series.len() > 1).then(|| (spheres, Pairs::of(series, &values)))
+    };
+    comparison.counts().filter_map(of_count).collect()
+}
+
+/// A table for each number of spheres: every method against the first, and those that it is not established to differ from.
+pub(crate) fn difference_tables(comparison: &Comparison<'_>, how: &str) -> Vec<Table> {
+    let name = |series: usize| comparison.series[series].as_str();
+    let mut tables = vec![];
+    for (spheres, pairs) in rankings(comparison) {
+        let first = pairs.series[0];
+        let cell = |series: usize, text: fn(&Paired) -> Option<String>| {
+            Cell::optional(pairs.between(series, first).and_then(|pair| text(&pair)))
+        };
+        let rows = Table::of(&pairs.series)
+            .text("method", |&series| name(series))
+            .text(format!("Hausdorff ÷ {}", name(first)), |&s| cell(s, Paired::ratio_text))
+            .number("n", |&s| cell(s, |pair| Some(pair.meshes().to_string())))
+            .text("better, equal, worse", |&s| {
+                cell(s, |pair| Some(pair.outcomes.map(|count| count.to_string()).join(", ")))
+            })
+            .number("effect", |&s| cell(s, |pair| Some(format!("{:.2}", pair.effect))))
+            .number("p", |&s| cell(s, |pair| Some(p_text(pair.corrected))))
+            .text("not established to differ from", |&series| match &pairs.alike(series)[..] {
+                [] => "–".to_owned(),
+                alike if alike.len() > 1 && alike.len() + 1 == pairs.series.len() => {
+                    "any other".to_owned()
+                }
+                alike => alike.iter().map(|&other| name(other)).collect::<Vec<_>>().join(", "),
+            });
+        let mut notes = vec![how.to_owned(), NOTE.to_owned()];
+        let most = pairs.pairs.iter().map(Paired::meshes).max().unwrap_or(0);
+        let least = pairs.pairs.len() as f64 * 2.0 * 0.5f64.powi(most as i32);
+        if most < FEWEST || least >= LEVEL {
+            let meshes = counted(most, "mesh", "meshes");
+            let pairs = counted(pairs.pairs.len(), "pair", "pairs");
+            notes.push(format!(
+                "With {meshes} and {pairs} of methods, no difference can be established."
+            ));
+        }
+        let caption = format!("Differences at {}", counted(spheres, "sphere", "spheres"));
+        tables.push(Table { caption, notes, ..rows.table });
+    }
+    tables
+}
+
+const NOTE: &str = "By median Hausdorff error. Ratios are geometric means over the meshes where both have a result, with \
+    95 % intervals from 2,000 resampled sets of meshes, if they are at least six. n: meshes where either has a result; a \
+    missing one, or an error above 5 %, counts as infinite. Effect: from -1, worse on all meshes, to 1. p: two-sided \
+    Wilcoxon signed-rank test, corrected for all pairs of methods by Holm; established: below 0.05 on at least six meshes.";
+
+fn p_text(p: f64) -> String {
+    if p < 1e-4 { "< 0.0001".to_owned() } else { significant(p, 2) }
+}
+
+/// Every pair of methods at every number of spheres with all digits, as CSV.
+pub(crate) fn differences_csv(comparison: &Comparison<'_>) -> Result<Vec<u8>, csv::Error> {
+    let mut writer = csv::Writer::from_writer(vec![]);
+    writer.write_record([
+        "spheres",
+        "method",
+        "other",
+        "better",
+        "equal",
+        "worse",
+        "ratio",
+        "ratio_low",
+        "ratio_high",
+        "effect",
+        "p",
+        "p_corrected",
+    ])?;
+    for (spheres, pairs) in rankings(comparison) {
+        let names = pairs.series.iter().enumerate();
+        let names = names.flat_map(|(k, &a)| pairs.series[k + 1..].iter().map(move |&b| [a, b]));
+        for (pair, names) in pairs.pairs.iter().zip(names) {
+            let known =
+                |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
+            let mut row = vec![spheres.to_string()];
+            row.extend(names.map(|series| comparison.series[series].clone()));
+            row.extend(pair.outcomes.map(|count| count.to_string()));
+            row.push(known(pair.ratio));
+            row.extend([0, 1].map(|end| known(pair.interval.map(|ends| ends[end]))));
+            row.extend([pair.effect, pair.p, pair.corrected].map(|value| value.to_string()));
+            writer.write_record(row)?;
+        }
+    }
+    writer.into_inner().map_err(|error| error.into_error().into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signed_ranks_equal_enumeration() {
+        // All signs of ranks with ties, counted one by one.
+        let differences = [0.5, -1.0, 1.0, 2.0, 2.0, -3.0, 4.0, 0.0, f64::INFINITY, f64::INFINITY];
+        let ranks = [1.0, 2.5, 2.5, 4.5, 4.5, 6.0, 7.0, 8.5, 8.5];
+        let found: f64 = 45.0 - 2.5 - 6.0;
+        let sum = |signs: u32| -> f64 {
+            (0..9).filter(|k| signs >> k & 1 == 1).map(|k| ranks[k as usize]).sum()
+        };
+        let extreme = (0..512).filter(|&signs| sum(signs) >= found).count();
+        let (effect, p) = signed_ranks(&differences);
+        assert!((p - 2.0 * extreme as f64 / 512.0).abs() < 1e-12, "{p}");
+        assert!((effect - (8.5 - found) / 45.0).abs() < 1e-12, "{effect}");
+        assert_eq!(signed_ranks(&[0.0, 0.0]), (0.0, 1.0));
+    }
+
+    #[test]
+    fn the_normal_distribution_continues_the_exact_one() {
+        let mut differences: Vec<f64> =
+            (1..=MOST_EXACT).map(|k| k as f64 * if k % 5 < 2 { -1.0 } else { 1.0 }).collect();
+        let exact = signed_ranks(&differences).1;
+        differences.push(0.5);
+        let normal = signed_ranks(&differences).1;
+        assert!((exact / normal - 1.0).abs() < 0.1, "{exact} {normal}");
+    }
+
+    #[test]
+    fn holm_steps_down() {
+        let corrected = holm(&[0.01, 0.04, 0.03, 0.005]);
+        let expected = [0.03, 0.06, 0.06, 0.02];
+        assert!(
+            corrected.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12),
+            "{corrected:?}"
+        );
+    }
+
+    #[test]
+    fn intervals_hold_the_mean_and_need_six_meshes() {
+        let values = [0.2, 0.25, 0.3, 0.2, 0.4, 0.22, 0.31];
+        let [low, high] = interval(&values).unwrap();
+        assert!(0.2 < low && low < 0.26 && 0.26 < high && high < 0.4, "{low} {high}");
+        assert_eq!(interval(&values[..5]), None);
+        assert_eq!(interval(&values), interval(&values));
+    }
+}
