@@ -9,6 +9,7 @@
 use std::cmp::Ordering;
 
 use crate::comparison::{Comparison, Entry, reached};
+use crate::header::Header;
 use crate::metric::{HAUSDORFF, MIN_ANGLE, TOTAL_SECONDS, median};
 use crate::record::{Record, Status, Target};
 use crate::statistics::{FEWEST, Pairs};
@@ -50,10 +51,17 @@ struct Criterion {
 }
 
 /// The table "Which method?"; `None` where nothing compares. With one mesh it shows results instead of medians.
-pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Table> {
+pub(crate) fn purpose_table(
+    comparison: &Comparison<'_>,
+    header: &Header,
+    how: &str,
+) -> Option<Table> {
     let mut rows = vec![];
     if let Some((level, spheres)) = usual_level(comparison) {
         rows.extend(at_count(comparison, level, spheres));
+        for (name, meshes) in &header.groups {
+            rows.extend(in_group(comparison, level, spheres, (name, meshes)));
+        }
     }
     rows.extend(within_bound(comparison));
     let is_one = comparison.meshes.len() == 1;
@@ -107,6 +115,23 @@ fn at_count(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Ve
     rows.push(right_everywhere(comparison, level, &spheres));
     rows.extend(rows_of(comparison, &triangles));
     rows
+}
+
+/// The rows of the lowest error among the meshes of a group.
+fn in_group(
+    comparison: &Comparison<'_>,
+    level: usize,
+    spheres: usize,
+    (name, meshes): (&str, &[String]),
+) -> Vec<Vec<Cell>> {
+    let mut values = errors_at(comparison, level);
+    for own in &mut values {
+        for (mesh, found) in comparison.meshes.iter().zip(own) {
+            *found = found.filter(|_| meshes.contains(mesh));
+        }
+    }
+    let title = format!("{name}: lowest error at {}", counted(spheres, "sphere", "spheres"));
+    rows_of(comparison, &error_criterion(values, title))
 }
 
 fn error_criterion(values: Vec<Values>, title: String) -> Criterion {

@@ -1,6 +1,8 @@
 //! The head of a report: the runs, their dates, their machines, the methods.
 
-use medial::simplifier::{MethodInfo, Presentation};
+use std::collections::BTreeMap;
+
+use medial::simplifier::{MethodInfo, ParamInfo, Presentation};
 use serde::{Deserialize, Serialize};
 
 use crate::record::Machine;
@@ -23,6 +25,12 @@ pub struct Header {
     /// Remarks on all of it, such as lines of the results that could not be read.
     #[serde(default)]
     pub notes: Vec<String>,
+    /// Groups of meshes by name, which "Which method?" ranks by themselves.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub groups: BTreeMap<String, Vec<String>>,
+    /// Whether the page is part of a [site](crate::write_site).
+    #[serde(skip)]
+    pub is_site: bool,
     /// The state of a comparison that still adds records; `None` once it has ended.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub running: Option<Running>,
@@ -58,7 +66,7 @@ pub struct RunNote {
 }
 
 /// A method as the page describes it.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MethodNote {
     /// Id of the method.
     pub id: String,
@@ -79,6 +87,9 @@ pub struct MethodNote {
     /// Name and unit of the method's own level, where it has one.
     #[serde(default)]
     pub native: Option<String>,
+    /// Its parameters.
+    #[serde(default)]
+    pub params: Vec<ParamInfo>,
 }
 
 impl MethodNote {
@@ -93,6 +104,7 @@ impl MethodNote {
             home: presentation.best_for.to_string(),
             published: info.published.to_string(),
             native: info.native.as_ref().map(|native| format!("{} ({})", native.name, native.unit)),
+            params: info.params.clone(),
         }
     }
 

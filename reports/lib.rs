@@ -19,6 +19,7 @@
 //! | [`render`] | pictures of surfaces and medial meshes as PNG |
 //! | `view3d` | geometry of the 3D views |
 //! | `page` | the self-contained `index.html` |
+//! | `site` | [`write_site`], the report with a page for each method and mesh |
 //! | `write` | [`write_report`], all of it into one folder |
 
 mod answers;
@@ -35,6 +36,7 @@ mod pictures;
 mod plots;
 mod record;
 pub mod render;
+mod site;
 mod statistics;
 mod summary;
 mod tables;
@@ -55,6 +57,7 @@ pub use record::{
     Conditions, Initial, Machine, OwnSeconds, Record, Repetition, Simplify, Stages, Status, Target,
     file_inside,
 };
+pub use site::write_site;
 pub use text::{file_stem, printable, significant};
 pub use view3d::View3d;
 pub use write::{ReportError, read_header, results_csv, write_report};

@@ -10,6 +10,8 @@
 //!
 //! `scripts/check_statistics.py` computes the same with SciPy.
 
+use medial::geometry::hash::splitmix;
+
 use crate::answers::{Values, errors_at, ranked};
 use crate::comparison::Comparison;
 use crate::tables::{Cell, Table};
@@ -191,10 +193,9 @@ fn interval_of_logs(logs: &[f64]) -> Option<[f64; 2]> {
         // SplitMix64 of Steele et al., 2014: a few lines in any language repeat it.
         let mut state = SEED;
         let mut below = |size: usize| {
+            let random = splitmix(state);
             state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-            let mut z = (state ^ (state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-            ((u128::from(z ^ (z >> 31)) * size as u128) >> 64) as usize
+            ((u128::from(random) * size as u128) >> 64) as usize
         };
         let mut means: Vec<f64> = (0..RESAMPLES)
             .map(|_| {
@@ -257,6 +258,29 @@ pub(crate) fn difference_tables(comparison: &Comparison<'_>, how: &str) -> Vec<T
         }
         let caption = format!("Differences at {}", counted(spheres, "sphere", "spheres"));
         tables.push(Table { caption, notes, ..rows.table });
+    }
+    tables
+}
+
+/// A table for each number of spheres: one method against each other one. Empty where it has no median.
+pub(crate) fn against_others(comparison: &Comparison<'_>, series: usize) -> Vec<Table> {
+    let mut tables = vec![];
+    for (spheres, pairs) in rankings(comparison) {
+        let others =
+            pairs.series.iter().filter_map(|&other| Some((other, pairs.between(series, other)?)));
+        let others: Vec<(usize, Paired)> = others.collect();
+        let rows = Table::of(&others)
+            .text("other method", |(other, _)| comparison.series[*other].as_str())
+            .text("Hausdorff ÷ its", |(_, pair)| Cell::optional(pair.ratio_text()))
+            .number("n", |(_, pair)| pair.meshes().to_string())
+            .text("better, equal, worse", |(_, pair)| {
+                pair.outcomes.map(|n| n.to_string()).join(", ")
+            })
+            .number("p", |(_, pair)| p_text(pair.corrected))
+            .text("established", |(_, pair)| if pair.is_established() { "yes" } else { "no" });
+        let caption = format!("Against the others at {}", counted(spheres, "sphere", "spheres"));
+        let notes = vec![NOTE.to_owned()];
+        tables.extend((!others.is_empty()).then_some(Table { caption, notes, ..rows.table }));
     }
     tables
 }

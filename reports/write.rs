@@ -51,7 +51,7 @@ pub fn write_report(
     let csv = to_csv(&comparison).map_err(|error| ReportError::content("results.csv", error))?;
     files.write("results.csv", &csv)?;
 
-    let answers = purpose_table(&comparison, &how);
+    let answers = purpose_table(&comparison, header, &how);
     let mut equal_error: Vec<Table> =
         equal_error_table(&comparison, &bounds, &how).into_iter().collect();
     let mut means = vec![means_table(&comparison, &summaries, &how)];
@@ -86,7 +86,8 @@ pub fn write_report(
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
     let has_plots = stems.len() <= MOST_PLOTTED;
     let pictures = strips(&comparison);
-    let (mut room, mut room_3d) = (PICTURES, VIEWS_INSIDE);
+    // A site is a folder: nothing in it needs to be there twice.
+    let [mut room, mut room_3d] = if header.is_site { [0; 2] } else { [PICTURES, VIEWS_INSIDE] };
     let mut meshes = Vec::new();
     for (mesh, stem) in stems.into_iter().enumerate() {
         let part = MeshPart {
@@ -220,13 +221,13 @@ impl ReportError {
 }
 
 /// The folder of the report and the written files.
-struct Files<'a> {
-    dir: &'a Path,
-    written: Vec<PathBuf>,
+pub(crate) struct Files<'a> {
+    pub(crate) dir: &'a Path,
+    pub(crate) written: Vec<PathBuf>,
 }
 
 impl Files<'_> {
-    fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), ReportError> {
+    pub(crate) fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), ReportError> {
         let path = self.dir.join(name);
         replace_file(&path, bytes)
             .map_err(|source| ReportError::Io { path: path.clone(), source })?;

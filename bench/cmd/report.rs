@@ -8,7 +8,7 @@ use std::time::SystemTime;
 
 use clap::Args;
 use medial::metrics::DEFINITIONS;
-use medial_reports::{Header, Record, Target, editions, read_header, write_records};
+use medial_reports::{Header, Record, Target, editions, read_header, write_records, write_site};
 use serde_json::json;
 
 use crate::args::Global;
@@ -35,6 +35,9 @@ pub struct Arguments {
     /// the edition.
     #[arg(long, value_name = "DIR")]
     freeze: Option<PathBuf>,
+    /// Also write a static site into this folder: the page, and a page for each method and mesh.
+    #[arg(long, value_name = "DIR")]
+    site: Option<PathBuf>,
 }
 
 /// Runs the verb.
@@ -53,11 +56,21 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     };
     // While another process adds records, a page would be outdated at once.
     let held = dir.is_dir().then(|| Store::open(dir, RESULTS, "medial report")).transpose()?;
-    let Rebuilt { records, files, mut warnings, undrawn } = rebuild(dir, registry)?;
+    let Rebuilt { records, shown, files, mut warnings, undrawn } = rebuild(dir, registry)?;
     warnings.extend(undrawn);
     warnings.extend(notes);
     if let Some(edition) = &arguments.freeze {
         freeze(dir, &records, edition, registry)?;
+    }
+    if let Some(site) = &arguments.site {
+        if site.join(AXES).exists() {
+            return Err(Failure::at(
+                site,
+                "a folder of results; write the site into a folder of its own",
+            ));
+        }
+        let header = read_header(dir).map_err(Failure::input)?;
+        write_site(site, dir, &shown, &header).map_err(Failure::input)?;
     }
     drop(held);
     if global.json {

@@ -37,6 +37,8 @@ pub const STUDY: &str = "study.toml";
 pub struct Rebuilt {
     /// The records.
     pub records: Vec<Record>,
+    /// Those in the report, with the records of an edition.
+    pub shown: Vec<Record>,
     /// The files that were written.
     pub files: Vec<PathBuf>,
     /// Lines without a record.
@@ -91,7 +93,8 @@ impl RunReport<'_> {
         let is_marked = read_header(self.dir).is_ok_and(|header| header.running.is_some());
         // Byte for byte the same page: a repeated command changes no file.
         if !self.adds && self.dir.join(PAGE).exists() && !is_marked {
-            return Ok(Rebuilt { records, files: vec![], warnings, undrawn: vec![] });
+            let (shown, files, undrawn) = (vec![], vec![], vec![]);
+            return Ok(Rebuilt { records, shown, files, warnings, undrawn });
         }
         let mut header = header(self.dir, &records, self.registry, &warnings);
         header.running = running;
@@ -136,7 +139,7 @@ fn write(
         undrawn = pictures::draw(dir, &shown, &sources);
     }
     let files = write_report(dir, &shown, &header).map_err(Failure::input)?;
-    Ok(Rebuilt { records, files, warnings, undrawn })
+    Ok(Rebuilt { records, shown, files, warnings, undrawn })
 }
 
 /// The fields that decide the position of a record in its study: mesh, method with parameters, level.
@@ -184,6 +187,8 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
         methods: earlier.methods,
         study: fs::read_to_string(dir.join(STUDY)).ok(),
         notes: warnings.to_vec(),
+        groups: Study::read(&dir.join(STUDY)).map(|study| study.groups).unwrap_or_default(),
+        is_site: false,
         running: None,
     };
     for record in records {

@@ -17,7 +17,7 @@ pub mod library;
 pub mod registry;
 pub mod source;
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use medial::simplifier::Params;
@@ -115,6 +115,9 @@ pub struct Study {
     pub plugins: Vec<PathBuf>,
     /// Further methods that start from the output of each filter.
     pub after_filters: Vec<String>,
+    /// Groups of meshes by name, which the report ranks by themselves: names of meshes as in the tables.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub groups: BTreeMap<String, Vec<String>>,
     /// Methods with their parameters [default: all but those on request].
     #[serde(rename = "method")]
     pub methods: Vec<StudyMethod>,
@@ -184,6 +187,7 @@ impl Default for Study {
             jobs: 1,
             memory: None,
             keep: Keep::default(),
+            groups: BTreeMap::new(),
             against: None,
             plugins: vec![],
             after_filters: vec![],

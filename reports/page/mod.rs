@@ -200,6 +200,7 @@ impl Page<'_> {
             "earlier": runs.split_last().map_or(&[][..], |(_, earlier)| earlier).iter().map(earlier).collect::<Vec<_>>(),
             "study": header.study,
             "running": header.running,
+            "site": header.is_site,
             "alert": self.alert(),
             "notices": (comparison.edition_note().into_iter())
                 .chain(comparison.seeds_note())

@@ -136,7 +136,7 @@ const paste = (title, file, text) => {
 };
 
 const methodsOf = (methods) => make("dl", {}, ...methods.flatMap(({ id, title, summary, home, published, citation }) => [
-  make("dt", {}, `${id}: ${title}`),
+  make("dt", {}, report.site ? make("a", { href: `./method-${id}.html` }, `${id}: ${title}`) : `${id}: ${title}`),
   make("dd", {}, [summary, home && `Best suited for: ${home}`, published && `Published level: ${published}.`]
     .filter(Boolean).join(" "), make("cite", {}, citation)),
 ]));
@@ -163,6 +163,7 @@ const meshFolds = (bulk) => report.meshes.map((mesh, index) => late(
   make("details", { class: "mesh", id: `mesh-${mesh.stem}` }, make("summary", {}, `${mesh.name} `, make("small", {}, mesh.brief))),
   () => [...meshParts(index, true, bulk.figures[index] ?? []).filter(Boolean),
     make("p", {}, make("a", { href: `#results?mesh=${encodeURIComponent(mesh.name)}` }, "Results of this mesh"), " as ",
+      ...(report.site ? [make("a", { href: `./mesh-${mesh.stem}.html` }, "a page"), ", "] : []),
       make("a", { href: `./tables/mesh-${mesh.stem}.md` }, "Markdown"), ", ",
       make("a", { href: `./tables/mesh-${mesh.stem}.tex` }, "LaTeX"))]));
 
@@ -244,9 +245,9 @@ const start = async () => {
       "tables as LaTeX for \\input. They need no package; booktabs gives finer rules, graphicx shrinks wide tables to the " +
       "width of the text. A plot as PDF: rsvg-convert -f pdf -o x.pdf plots/x.svg (librsvg).";
     const bibtex = ["BibTeX of the methods and the program", "./tables/methods.bib", report.papers];
-    folds.push(fold("papers", "For papers", make("p", {}, about), paste(...bibtex)));
+    folds.push(fold("papers", "How to cite, plots and tables for papers", make("p", {}, about), paste(...bibtex)));
   }
-  folds.push(fold("files", "Files", make("ul", {}, ...FILES.slice(0, report.sections.length ? 4 : 2).map(([path, text]) =>
+  folds.push(fold("files", "Files", make("ul", {}, ...FILES.slice(report.site ? 1 : 0, report.sections.length ? 4 : 2).map(([path, text]) =>
     make("li", {}, make("a", { href: `./${path}` }, path), `: ${text}`)))));
   const runs = [
     report.earlier.length && make("h3", {}, `${counted(report.earlier.length, "earlier run", "earlier runs")} that added records`),
@@ -259,6 +260,7 @@ const start = async () => {
   const named = [...main.querySelectorAll(":scope > section > h2, #more > details.fold > summary")];
   document.querySelector("nav").append(...named.map((head) =>
     make("a", { href: `#${head.parentElement.id}` }, head.textContent)));
+  if (report.site) document.querySelector("nav").append(make("a", { href: "./submissions.html" }, "Hand in results"));
   openTarget();
   document.documentElement.dataset.ready = "";
 };

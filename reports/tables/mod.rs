@@ -7,7 +7,7 @@ mod mesh;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
-use crate::text::printable;
+use crate::text::{escape_html, printable};
 
 pub(crate) use self::csv::{flatten, to_csv, warnings};
 pub(crate) use self::mesh::{Best, mesh_table, remark, topology_word};
@@ -168,6 +168,33 @@ impl Serialize for Cell {
         cell.serialize_field("best", &text)?;
         cell.end()
     }
+}
+
+/// A heading, the table and its notes as HTML. `link` has the address of a text in a cell, where there is one.
+pub(crate) fn to_html(table: &Table, link: &dyn Fn(&str) -> Option<String>) -> String {
+    let class = |k: usize| if table.columns[k].number { " class=\"num\"" } else { "" };
+    let heads = table.columns.iter().enumerate();
+    let heads =
+        heads.map(|(k, column)| format!("<th{}>{}</th>", class(k), escape_html(&column.title)));
+    let mut text =
+        format!("<h2>{}</h2>\n<div class=\"scroll\"><table>\n", escape_html(&table.caption));
+    text += &format!("<thead><tr>{}</tr></thead>\n<tbody>\n", heads.collect::<String>());
+    for row in &table.rows {
+        let cells = row.iter().enumerate().map(|(k, cell)| {
+            let mut inner = escape_html(&cell.text);
+            if let Some(address) = link(&cell.text) {
+                inner = format!("<a href=\"{}\">{inner}</a>", escape_html(&address));
+            }
+            let inner = if cell.best { format!("<strong>{inner}</strong>") } else { inner };
+            format!("<td{}>{inner}</td>", class(k))
+        });
+        text += &format!("<tr>{}</tr>\n", cells.collect::<String>());
+    }
+    text += "</tbody></table></div>\n";
+    let notes = table.notes.iter().filter(|note| !note.is_empty());
+    text + &notes
+        .map(|note| format!("<p class=\"note\">{}</p>\n", escape_html(note)))
+        .collect::<String>()
 }
 
 /// A heading, the notes, and a pipe table.

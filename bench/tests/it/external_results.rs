@@ -5,7 +5,7 @@ use std::fs;
 use medial_bench::study::source::{Input, Source};
 use serde_json::{Value, json};
 
-use crate::command::{done, folder, records};
+use crate::command::{done, folder, records, run};
 
 /// The records of external results among those of `medial compare --given theirs=GIVEN`.
 fn compared_with(given: &str, out: &str) -> Vec<Value> {
@@ -74,4 +74,135 @@ fn the_hash_of_an_input_is_that_of_the_parsed_bytes() {
     let second = Input::load(&source).expect("a solid");
     assert_ne!(first.hash, second.hash);
     assert_eq!((first.mesh.vertices[3].z, second.mesh.vertices[3].z), (1.0, 2.0));
+}
+
+/// The message of `compare --given theirs=GIVEN`, which is refused.
+fn refused(given: &str, out: &str) -> String {
+    let given = format!("theirs={given}");
+    let words =
+        ["compare", "builtin:capsule", "--methods", "qmat", "--given", &given, "--out", out];
+    let (code, _, message) = run(&words);
+    assert_eq!(code, 2, "{message}");
+    message
+}
+
+#[test]
+fn a_forged_folder_is_refused_or_measured() {
+    let at = folder();
+    fs::create_dir(at("theirs")).expect("a folder");
+    let good = at("theirs/capsule-20.ma");
+    done(&["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "-o", &good]);
+    let mesh = fs::read_to_string(&good).expect("read");
+    let long = "x".repeat(200_000);
+    let claims = [
+        ("hausdorff = 0.0", "unknown field `hausdorff`"),
+        ("[evaluate]\nhausdorff = 0.0", "unknown field `evaluate`"),
+        ("seconds = { capsule-20 = -1.0 }", "expected a number from 0"),
+        ("seconds = { capsule-20 = nan }", "expected a number from 0"),
+        ("bibtex = \"@misc{x, title = {a}\"", "balanced braces"),
+        ("bibtex = \"\\\\input{/etc/passwd}\"", "balanced braces"),
+        (&format!("title = \"{long}\""), "too large"),
+    ];
+    for (text, reason) in claims {
+        fs::write(at("theirs/method.toml"), text).expect("written");
+        let message = refused(&at("theirs"), &at("report"));
+        assert!(message.contains("method.toml") && message.contains(reason), "{text}: {message}");
+        assert!(message.len() < 2_000, "{}", message.len());
+    }
+    fs::remove_file(at("theirs/method.toml")).expect("removed");
+
+    // Ten gigabytes that take no room on the disk.
+    let huge = fs::File::create(at("theirs/capsule-30.ma")).expect("created");
+    huge.set_len(10_000_000_000).expect("a sparse file");
+    let message = refused(&at("theirs"), &at("report"));
+    assert!(message.contains("capsule-30.ma: too large"), "{message}");
+    fs::remove_file(at("theirs/capsule-30.ma")).expect("removed");
+
+    fs::rename(&good, at("theirs/elephant-20.ma")).expect("renamed");
+    let message = refused(&at("theirs"), &at("report"));
+    assert!(message.contains("no file MESH.ma or MESH-COUNT.ma"), "{message}");
+
+    // A count in the name is no claim, nor is text that looks like markup.
+    fs::write(at("theirs/capsule-500.ma"), mesh).expect("written");
+    let title = "title = \"<script>alert(1)</script>\"\nauthors = \"\u{202e}x\"\n";
+    fs::write(at("theirs/method.toml"), title).expect("written");
+    let theirs = compared_with(&at("theirs"), &at("report"));
+    assert_eq!(theirs[0]["simplify"]["spheres"], 20);
+    let page = fs::read_to_string(at("report/index.html")).expect("a page");
+    assert!(!page.contains("<script>alert(1)") && !page.contains('\u{202e}'));
+}
+
+#[test]
+fn a_site_has_a_page_for_each_method_mesh_and_external_result() {
+    let at = folder();
+    fs::create_dir(at("theirs")).expect("a folder");
+    let file = at("theirs/capsule-20.ma");
+    done(&["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "-o", &file]);
+    let claims = "title = \"Their <method>\"\nbibtex = \"@misc{them, title = {Theirs}}\"\nmachine = \"a laptop\"\n";
+    fs::write(at("theirs/method.toml"), claims).expect("written");
+    compared_with(&at("theirs"), &at("report"));
+    done(&["report", &at("report"), "--site", &at("site")]);
+    let pages = [
+        "index.html",
+        "method-qmat.html",
+        "method-theirs.html",
+        "mesh-capsule.html",
+        "submissions.html",
+    ];
+    for page in pages {
+        let html = fs::read_to_string(at(&format!("site/{page}"))).expect(page);
+        assert!(!html.contains("src=\"http"), "{page} loads from another host");
+        if page == "index.html" {
+            continue; // drawn by its script
+        }
+        for part in html
+            .split(['<', '>'])
+            .filter(|part| part.starts_with("a href") || part.starts_with("img src"))
+        {
+            let address =
+                part.split('"').nth(1).expect("an address").split('#').next().expect("a file");
+            let is_here = address.starts_with("https://")
+                || fs::exists(at(&format!("site/{address}"))).is_ok_and(|here| here);
+            assert!(is_here, "{page}: {address}");
+        }
+    }
+    let theirs = fs::read_to_string(at("site/method-theirs.html")).expect("a page");
+    assert!(
+        theirs.contains("Their &lt;method&gt;")
+            && theirs.contains("@misc{them")
+            && theirs.contains("a laptop"),
+        "{theirs}"
+    );
+    let bibtex = fs::read_to_string(at("report/tables/methods.bib")).expect("a file");
+    assert!(bibtex.contains("@misc{them") && bibtex.contains("medial"), "{bibtex}");
+    // A store is no place for a site.
+    assert_eq!(run(&["report", &at("report"), "--site", &at("report")]).0, 1);
+}
+
+#[test]
+fn seeds_are_results_of_one_row() {
+    let at = folder();
+    let words = [
+        "compare",
+        "builtin:torus",
+        "builtin:capsule",
+        "--methods",
+        "coverage-axis,qmat",
+        "--spheres",
+        "12",
+    ];
+    done(&[&words[..], &["--counts-only", "--seeds", "3", "--out", &at("report")]].concat());
+    let of = |method: &str| {
+        let all =
+            records(&at("report")).into_iter().filter(move |r| r["simplify"]["method"] == method);
+        all.map(|record| record["simplify"]["seed"].as_u64().expect("a seed")).collect::<Vec<_>>()
+    };
+    assert_eq!(of("coverage-axis"), [0, 1, 2, 0, 1, 2]);
+    assert_eq!(of("qmat"), [0, 0], "it depends on no seed");
+    let table = fs::read_to_string(at("report/tables/mesh-capsule.md")).expect("a table");
+    assert_eq!(table.matches("| coverage-axis |").count(), 1, "{table}");
+    assert!(
+        table.contains("Hausdorff over seeds") && table.contains("With 3 seeds: coverage-axis"),
+        "{table}"
+    );
 }

@@ -1,0 +1,265 @@
+//! A static site: the page of a report, with a page for each method, each mesh and the external results.
+//!
+//! The further pages have no script. Everything is in one folder, with relative links, so it opens from disk and from any
+//! static host.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::comparison::{Comparison, Entry, reached};
+use crate::header::{Header, MethodNote};
+use crate::metric::{HAUSDORFF, MEAN_ERROR, MIN_ANGLE, TOTAL_SECONDS};
+use crate::pictures::strips;
+use crate::record::{Record, Status};
+use crate::statistics::against_others;
+use crate::tables::{Cell, Table, mesh_table, to_html, topology_word};
+use crate::text::{escape_html, file_stem, file_stems, grouped};
+use crate::write::{Files, ReportError, write_report};
+
+/// Writes the site of some records into a folder: the report without medial meshes, and further pages. Pictures and 3D views
+/// are copied from the report in `store`. Returns the files.
+///
+/// # Errors
+/// As [`write_report`].
+pub fn write_site(
+    dir: &Path,
+    store: &Path,
+    records: &[Record],
+    header: &Header,
+) -> Result<Vec<PathBuf>, ReportError> {
+    let comparison = Comparison::new(records);
+    let pictures = strips(&comparison);
+    let mut files = Files { dir, written: vec![] };
+    for file in pictures.values().flat_map(|strip| [strip.file.clone(), strip.view_file()]) {
+        // A mesh without pictures has none here either.
+        if let Ok(bytes) = fs::read(store.join(&file)) {
+            files.write(&file, &bytes)?;
+        }
+    }
+    let header = Header { is_site: true, ..header.clone() };
+    let report = write_report(dir, records, &header)?;
+
+    let site = Site {
+        comparison: &comparison,
+        header: &header,
+        stems: file_stems(comparison.meshes.iter().map(String::as_str)),
+    };
+    for note in site.methods() {
+        files.write(&method_file(&note.id), site.method_page(note).as_bytes())?;
+    }
+    for (mesh, stem) in site.stems.iter().enumerate() {
+        let picture = pictures.get(&mesh).map(|strip| strip.file.as_str());
+        let picture = picture.filter(|file| dir.join(file).is_file());
+        let page = site.mesh_page(mesh, picture, |file| report.contains(&dir.join(file)));
+        files.write(&mesh_file(stem), page.as_bytes())?;
+    }
+    files.write(SUBMISSIONS, site.submissions_page().as_bytes())?;
+    Ok([report, files.written].concat())
+}
+
+const SUBMISSIONS: &str = "submissions.html";
+
+fn method_file(id: &str) -> String {
+    format!("method-{}.html", file_stem(id))
+}
+
+fn mesh_file(stem: &str) -> String {
+    format!("mesh-{stem}.html")
+}
+
+struct Site<'a> {
+    comparison: &'a Comparison<'a>,
+    header: &'a Header,
+    /// Names of the files of each mesh.
+    stems: Vec<String>,
+}
+
+impl Site<'_> {
+    /// The methods with records.
+    fn methods(&self) -> impl Iterator<Item = &MethodNote> {
+        self.header
+            .methods
+            .iter()
+            .filter(|note| self.comparison.methods.contains(&note.id.as_str()))
+    }
+
+    /// The page that describes a mesh or a method, by the text of a cell.
+    fn link(&self, text: &str) -> Option<String> {
+        let comparison = self.comparison;
+        if let Some(mesh) = comparison.meshes.iter().position(|mesh| mesh == text) {
+            return Some(mesh_file(&self.stems[mesh]));
+        }
+        let series = comparison.series.iter().position(|series| series == text)?;
+        Some(method_file(comparison.methods[series]))
+    }
+
+    fn page(&self, title: &str, body: &str) -> String {
+        let heading = if self.header.title.is_empty() { "all results" } else { &self.header.title };
+        let [title, heading, runs] = [title, heading, &self.header.how()].map(escape_html);
+        let style = include_str!("page/page.css");
+        format!(
+            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
+             content=\"width=device-width, initial-scale=1\">\n<meta name=\"color-scheme\" content=\"light dark\">\n\
+             <title>{title}</title>\n<style>\n{style}</style>\n</head>\n<body>\n<header>\n<h1>{title}</h1>\n<nav>\
+             <a href=\"index.html\">{heading}</a> <a href=\"{SUBMISSIONS}\">Hand in results</a></nav>\n</header>\n\
+             <main>\n{body}</main>\n<p class=\"note\">{runs}</p>\n</body>\n</html>\n"
+        )
+    }
+
+    fn method_page(&self, note: &MethodNote) -> String {
+        let comparison = self.comparison;
+        let mut body = String::new();
+        let texts = [
+            note.summary.clone(),
+            note.home.clone(),
+            note.native
+                .as_ref()
+                .map_or_else(String::new, |native| format!("Native level: {native}.")),
+        ];
+        for text in texts.iter().filter(|text| !text.is_empty()) {
+            body += &format!("<p>{}</p>\n", escape_html(text));
+        }
+        let link = |text: &str| self.link(text);
+        for series in (0..comparison.series.len()).filter(|&s| comparison.methods[s] == note.id) {
+            if comparison.series[series] != note.id {
+                body += &format!("<h2>{}</h2>\n", escape_html(&comparison.series[series]));
+            }
+            let mut others = against_others(comparison, series);
+            // One note, below the last.
+            others.iter_mut().skip(1).for_each(|table| table.notes.clear());
+            body += &others.iter().rev().map(|table| to_html(table, &link)).collect::<String>();
+            body += &to_html(&self.results(series), &link);
+        }
+        if !note.params.is_empty() {
+            let rows = Table::of(&note.params)
+                .text("parameter", |param| param.name.to_string())
+                .text("default", |param| param.default.clone())
+                .text("unit or values", |param| param.unit.to_string())
+                .text("meaning", |param| param.help.to_string());
+            let table = Table { caption: "Parameters".to_owned(), ..rows.table };
+            body += &to_html(&table, &|_| None);
+        }
+        if !note.citation.is_empty() {
+            body += &format!("<h2>Source</h2>\n<p>{}</p>\n", escape_html(&note.citation));
+        }
+        if !note.bibtex.is_empty() {
+            body += &format!(
+                "<pre class=\"command\"><code>{}</code></pre>\n",
+                escape_html(note.bibtex.trim())
+            );
+        }
+        self.page(&format!("{}: {}", note.id, note.title), &body)
+    }
+
+    /// The results of a series at requested counts, with their ranks on each mesh.
+    fn results(&self, series: usize) -> Table {
+        let comparison = self.comparison;
+        let entries = comparison
+            .entries
+            .iter()
+            .filter(|entry| entry.series == series && !comparison.levels[entry.level].is_native());
+        let entries: Vec<&Entry<'_>> = entries.collect();
+        let rank = |entry: &Entry<'_>| {
+            let here =
+                comparison.of_mesh(entry.mesh).filter(|e| e.level == entry.level && e.comparable());
+            let errors: Vec<f64> = here.filter_map(|e| HAUSDORFF.of(e.record)).collect();
+            let own = HAUSDORFF.of(entry.record).filter(|_| entry.comparable())?;
+            let better = errors.iter().filter(|&&error| error < own).count();
+            Some(format!("{} of {}", better + 1, errors.len()))
+        };
+        let mut rows = Table::of(&entries)
+            .text("mesh", |entry| comparison.meshes[entry.mesh].as_str())
+            .number("requested", |entry| entry.record.simplify.level.to_string())
+            .number("spheres", |entry| {
+                Cell::optional(reached(entry.record).map(|n| grouped(n as u64)))
+            })
+            .text("rank by Hausdorff", |entry| Cell::optional(rank(entry)));
+        for metric in [&HAUSDORFF, &MEAN_ERROR, &MIN_ANGLE, &TOTAL_SECONDS] {
+            rows = rows.number(metric.heading(), |entry| {
+                Cell::optional(metric.of(entry.record).map(|value| metric.format(value)))
+            });
+        }
+        let rows = rows.text("as solid", |entry| topology_word(entry));
+        Table { caption: "Results at requested numbers of spheres".to_owned(), ..rows.table }
+    }
+
+    fn mesh_page(
+        &self,
+        mesh: usize,
+        picture: Option<&str>,
+        is_here: impl Fn(&str) -> bool,
+    ) -> String {
+        let (name, stem) = (&self.comparison.meshes[mesh], &self.stems[mesh]);
+        let mut body = String::new();
+        if let Some(file) = picture {
+            let words = "medial meshes and errors of all methods, the least Hausdorff error first";
+            body += &format!(
+                "<p><img src=\"{file}\" alt=\"{}: {words}\" style=\"max-width:100%\"></p>\n",
+                escape_html(name)
+            );
+        }
+        body += &format!(
+            "<p><a href=\"index.html#mesh-{stem}\">3D view and interactive plots</a></p>\n"
+        );
+        for kind in ["hausdorff", "time"] {
+            let file = format!("plots/mesh-{stem}-{kind}.svg");
+            if is_here(&file) {
+                body += &format!(
+                    "<img src=\"{file}\" alt=\"{kind}\" style=\"max-width:min(100%,44rem)\">\n"
+                );
+            }
+        }
+        let mut table = mesh_table(self.comparison, mesh, "");
+        table.caption = "Every method at every level".to_owned();
+        body += &to_html(&table, &|text| self.link(text));
+        self.page(name, &body)
+    }
+
+    fn submissions_page(&self) -> String {
+        let comparison = self.comparison;
+        let external: Vec<&Entry<'_>> = comparison
+            .entries
+            .iter()
+            .filter(|entry| entry.record.status == Status::External)
+            .collect();
+        let rows = Table::of(&external)
+            .text("results", |entry| comparison.series[entry.series].as_str())
+            .text("mesh", |entry| comparison.meshes[entry.mesh].as_str())
+            .number("spheres", |entry| {
+                Cell::optional(reached(entry.record).map(|n| grouped(n as u64)))
+            })
+            .number(HAUSDORFF.heading(), |entry| {
+                Cell::optional(HAUSDORFF.of(entry.record).map(|error| HAUSDORFF.format(error)))
+            })
+            .number(MEAN_ERROR.heading(), |entry| {
+                Cell::optional(MEAN_ERROR.of(entry.record).map(|error| MEAN_ERROR.format(error)))
+            })
+            .text("as solid", |entry| topology_word(entry))
+            .number("claimed seconds", |entry| {
+                let claimed = entry.record.simplify.params.0.get("claimed_seconds");
+                Cell::optional(
+                    claimed.and_then(|value| value.as_f64()).map(|seconds| seconds.to_string()),
+                )
+            });
+        let note =
+            "Errors and topology are measured from the files. Seconds are as claimed.".to_owned();
+        let table =
+            Table { caption: "Handed-in results".to_owned(), notes: vec![note], ..rows.table };
+        let mut body = HAND_IN.to_owned();
+        if external.is_empty() {
+            body += "<p>Nobody has handed in results for this comparison yet.</p>\n";
+        } else {
+            body += &to_html(&table, &|text| self.link(text));
+        }
+        self.page("Hand in results", &body)
+    }
+}
+
+/// As in docs/submit.md.
+const HAND_IN: &str = "<ol>\n<li>Put one medial mesh for each mesh and number of spheres in a folder: \
+    <code>MESH-COUNT.ma</code>, in the units of the mesh.</li>\n<li>Add <code>method.toml</code> with title, authors, \
+    citation, bibtex, run, machine and, if you like, seconds.</li>\n<li>Check it as we do, and look at the page:\n\
+    <pre class=\"command\"><code>medial compare --dataset builtin --given 'NAME=FOLDER' --methods qmat --counts-only --against \
+    2027.1</code></pre></li>\n<li>Open a pull request that adds the folder below <code>submissions/</code>.</li>\n</ol>\n\
+    <p>Only the medial meshes count: every number but the claimed seconds is measured again. \
+    <a href=\"https://github.com/medial-rs/medial/blob/main/docs/submit.md\">More on handing in results</a></p>\n";
