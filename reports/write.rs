@@ -13,7 +13,7 @@ use crate::comparison::Comparison;
 use crate::header::Header;
 use crate::journal::{check_regular, replace_file};
 use crate::overview::overview_table;
-use crate::page::{MeshPart, MeshView, Page};
+use crate::page::{MeshPart, MeshView, Page, gzip};
 use crate::pictures::{FOLDER, PictureStrip, VIEWS, strips};
 use crate::plots::{Figure, mean_figures, mesh_figures, profile_figures, profiles_csv};
 use crate::record::Record;
@@ -49,7 +49,11 @@ pub fn write_report(
     let how = header.how();
     let mut files = Files { dir, written: Vec::new() };
     let csv = to_csv(&comparison).map_err(|error| ReportError::content("results.csv", error))?;
-    files.write("results.csv", &csv)?;
+    // Nobody keeps a site for its CSV.
+    match header.is_site {
+        true => files.write("results.csv.gz", &gzip(&csv))?,
+        false => files.write("results.csv", &csv)?,
+    }
 
     let answers = purpose_table(&comparison, header, &how);
     let mut equal_error: Vec<Table> =
@@ -81,7 +85,7 @@ pub fn write_report(
     }
     let mut figures = mean_figures(&comparison, &summaries, &natives);
     figures.extend(profiles);
-    files.write_plots(&figures)?;
+    files.write_plots(&figures.iter().collect::<Vec<_>>())?;
 
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
     let has_plots = stems.len() <= MOST_PLOTTED;
@@ -99,7 +103,10 @@ pub fn write_report(
         let table = mesh_table(&comparison, mesh, &how);
         let name = format!("mesh-{}", part.stem);
         files.write_tables(&name, &comparison.meshes[mesh], std::slice::from_ref(&table))?;
-        files.write_plots(&part.figures)?;
+        // A site has the two that its pages show.
+        let drawn: Vec<&Figure> =
+            part.figures.iter().filter(|figure| figure.leading || !header.is_site).collect();
+        files.write_plots(&drawn)?;
         meshes.push(part);
     }
     let bibtex = header.bibtex(&comparison.methods);
@@ -235,7 +242,7 @@ impl Files<'_> {
         Ok(())
     }
 
-    fn write_plots(&mut self, figures: &[Figure]) -> Result<(), ReportError> {
+    fn write_plots(&mut self, figures: &[&Figure]) -> Result<(), ReportError> {
         for figure in figures {
             if let Some(svg) = figure.to_svg()? {
                 self.write(&format!("plots/{}.svg", figure.stem), svg.as_bytes())?;

@@ -241,8 +241,15 @@ fn freeze(dir: &Path, records: &[Record], to: &Path, registry: &Registry) -> Res
     native.retain(|_, levels| !levels.is_empty());
     // Spread over meshes and methods; with few spheres they are small.
     let coarsest = study.spheres.iter().min().map(|&count| Target::Spheres(count));
-    let coarse = frozen.iter().filter(|record| Some(record.simplify.level) == coarsest);
-    let coarse: Vec<&String> = coarse.filter_map(|record| record.artifact.as_ref()).collect();
+    let mut coarse: Vec<&Record> = frozen.iter().collect();
+    coarse.retain(|record| Some(record.simplify.level) == coarsest && record.artifact.is_some());
+    let is_built_in = |record: &Record| record.dataset.as_deref() == Some("builtin");
+    if coarse.iter().any(|record| is_built_in(record)) {
+        // Everybody can measure these again.
+        coarse.retain(|record| is_built_in(record));
+    }
+    let coarse: Vec<&String> =
+        coarse.iter().filter_map(|record| record.artifact.as_ref()).collect();
     let count = KEPT.min(coarse.len());
     let kept: Vec<String> = (0..count).map(|k| coarse[k * coarse.len() / count].clone()).collect();
     for record in &mut frozen {

@@ -3,13 +3,12 @@
 //! The folder of an edition holds `study.toml`, from which it is made, `edition.toml`, its description, and
 //! `records.jsonl.gz`, its records. The runner reads the description and checks the records against it.
 
-use std::io::{self, Read, Write};
+use std::io::{self, Read};
 
-use flate2::Compression;
 use flate2::read::GzDecoder;
-use flate2::write::GzEncoder;
 
 use crate::journal::{Journaled, parse_records, to_line};
+use crate::page::gzip;
 use crate::{JournalError, Record};
 
 /// Name of the description of an edition in its folder.
@@ -42,10 +41,7 @@ pub const EDITIONS: &[Embedded] = &[Embedded {
 /// When a record has no JSON form.
 pub fn pack(records: &[Record]) -> Result<Vec<u8>, JournalError> {
     let text = records.iter().map(to_line).collect::<Result<String, _>>()?;
-    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
-    // Writing to a vector never fails.
-    let packed = encoder.write_all(text.as_bytes()).and_then(|()| encoder.finish());
-    Ok(packed.unwrap_or_default())
+    Ok(gzip(text.as_bytes()))
 }
 
 /// The records of packed JSON lines.

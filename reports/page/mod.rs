@@ -60,12 +60,17 @@ pub(crate) struct MeshView {
     pub(crate) text: Option<String>,
 }
 
-/// Bytes as gzip in Base64.
-pub(crate) fn pack(bytes: &[u8]) -> String {
+/// Bytes as gzip; equal bytes give equal ones.
+pub(crate) fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
     // Writing to a vector never fails.
     let packed = encoder.write_all(bytes).and_then(|()| encoder.finish());
-    BASE64_STANDARD.encode(packed.unwrap_or_default())
+    packed.unwrap_or_default()
+}
+
+/// Bytes as gzip in Base64.
+pub(crate) fn pack(bytes: &[u8]) -> String {
+    BASE64_STANDARD.encode(gzip(bytes))
 }
 
 /// An element with a packed text, which a browser skips until the script reads it.

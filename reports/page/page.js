@@ -247,8 +247,11 @@ const start = async () => {
     const bibtex = ["BibTeX of the methods and the program", "./tables/methods.bib", report.papers];
     folds.push(fold("papers", "How to cite, plots and tables for papers", make("p", {}, about), paste(...bibtex)));
   }
-  folds.push(fold("files", "Files", make("ul", {}, ...FILES.slice(report.site ? 1 : 0, report.sections.length ? 4 : 2).map(([path, text]) =>
-    make("li", {}, make("a", { href: `./${path}` }, path), `: ${text}`)))));
+  const kept = FILES.slice(report.site ? 1 : 0, report.sections.length ? 4 : 2);
+  folds.push(fold("files", "Files", make("ul", {}, ...kept.map(([path, text]) => {
+    const file = report.site && path === "results.csv" ? "results.csv.gz" : path;
+    return make("li", {}, make("a", { href: `./${file}` }, file), `: ${text}`);
+  }))));
   const runs = [
     report.earlier.length && make("h3", {}, `${counted(report.earlier.length, "earlier run", "earlier runs")} that added records`),
     report.earlier.length && make("ul", {}, ...report.earlier.map((line) => make("li", {}, make("code", {}, line)))),
