@@ -11,7 +11,7 @@ use crate::command::{done, folder, json, records, refused, words};
 fn compare_records_every_run() {
     let at = folder();
     let out = at("report");
-    let line = "compare builtin:box builtin:capsule --spheres 100,50 --counts-only --samples 1000";
+    let line = "compare builtin:box builtin:torus --spheres 100,50 --counts-only --samples 1000 --budget 300";
     // Counts that are missed are results.
     let stdout = done(&[&words(line)[..], &["--out", &out]].concat());
     insta::assert_snapshot!("compare_summary_heads", heads(&stdout));
