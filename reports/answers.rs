@@ -29,6 +29,9 @@ const USABLE: f64 = 2.0;
 /// Results with a larger error are not ranked by error, in % of the diagonal.
 const RANKED: f64 = 5.0;
 
+/// The end of the title of a row that is ranked by the number of meshes with a result.
+const MOST_MESHES: &str = ", on the most meshes";
+
 /// For each mesh the least value of a method; `None` where the method did not run.
 pub(crate) type Values = Vec<Option<Found>>;
 
@@ -297,7 +300,7 @@ fn rows_of(comparison: &Comparison<'_>, criterion: &Criterion) -> Vec<Vec<Cell>>
     let mut rows = vec![row_of(comparison, criterion, criterion.title.clone(), &ranks, &pairs)];
     ranks.sort_by(by_meshes);
     if ranks[0].series != first {
-        let title = format!("{}, on the most meshes", criterion.title);
+        let title = criterion.title.clone() + MOST_MESHES;
         rows.push(row_of(comparison, criterion, title, &ranks, &pairs));
     }
     rows
@@ -324,6 +327,9 @@ fn row_of(
     ];
     let runner_up = ranks.get(1).map(|rank| rank.series);
     let pair = runner_up.and_then(|second| pairs.between(first, second));
+    // A row of the most meshes is not ranked by values.
+    let is_by_value = !title.ends_with(MOST_MESHES);
+    let pair = pair.filter(|_| is_by_value);
     let ratio = pair.as_ref().and_then(|pair| {
         let ratio = pair.ratio_text()?;
         Some(format!("{ratio} of {}", criterion.of))

@@ -126,16 +126,18 @@ impl Header {
     pub(crate) fn bibtex(&self, methods: &[&str]) -> String {
         let mut entries: Vec<String> = Vec::new();
         for note in self.methods.iter().filter(|note| methods.contains(&note.id.as_str())) {
-            // Variants of a method share its publication, and BibTeX rejects a repeated key.
+            // Several methods share a publication, and BibTeX rejects a repeated key.
             let entry = note.bibtex.trim();
-            if !entry.is_empty() && !entries.iter().any(|known| known == entry) {
+            let key = |entry: &str| entry.split(',').next().unwrap_or_default().to_owned();
+            if !entry.is_empty() && !entries.iter().any(|known| key(known) == key(entry)) {
                 entries.push(entry.to_owned()); // in the order of the methods
             }
         }
         let version = self.runs.last().map_or("", |run| &run.version);
         entries.push(format!(
             "@misc{{medial,\n  title = {{medial: a reference harness for simplifying the 3D medial \
-             axis transform}},\n  note = {{Version {version}}}\n}}"
+             axis transform}},\n  author = {{{{The medial developers}}}},\n  url = \
+             {{https://github.com/medial-rs/medial}},\n  note = {{Version {version}}}\n}}"
         ));
         entries.join("\n\n") + "\n"
     }

@@ -257,7 +257,10 @@ impl Site<'_> {
 
 /// As in docs/submit.md.
 const HAND_IN: &str = "<ol>\n<li>Put one medial mesh for each mesh and number of spheres in a folder: \
-    <code>MESH-COUNT.ma</code>, in the units of the mesh.</li>\n<li>Add <code>method.toml</code> with title, authors, \
+    <code>MESH-COUNT.ma</code>, in the units of the mesh. The first line has the numbers of spheres, edges and faces; then \
+    come lines <code>v x y z r</code>, <code>e i j</code> and <code>f i j k</code>, counted from 0. A built-in mesh is \
+    written by <code>medial datasets make bracket -o bracket.off</code>. Any meshes and counts will do; the edition has 500, \
+    200 and 100 spheres.</li>\n<li>Add <code>method.toml</code> with title, authors, \
     citation, bibtex, run, machine and, if you like, seconds.</li>\n<li>Check it as we do, and look at the page:\n\
     <pre class=\"command\"><code>medial compare --dataset builtin --given 'NAME=FOLDER' --methods qmat --counts-only --against \
     2027.1</code></pre></li>\n<li>Open a pull request that adds the folder below <code>submissions/</code>.</li>\n</ol>\n\

@@ -200,6 +200,7 @@ impl Page<'_> {
         let ids: Vec<&str> = absent.iter().map(|note| note.id.as_str()).collect();
         let is_compared = comparison.measured() > 0 && !ids.is_empty();
         json!({
+            "lead": self.lead(),
             "facts": self.facts(),
             "command": command,
             "earlier": runs.split_last().map_or(&[][..], |(_, earlier)| earlier).iter().map(earlier).collect::<Vec<_>>(),
@@ -234,6 +235,23 @@ impl Page<'_> {
                 grouped(comparison.entries.len() as u64)
             )),
         })
+    }
+
+    /// What the page compares, and which of the methods are of this project.
+    fn lead(&self) -> String {
+        let notes = self
+            .header
+            .methods
+            .iter()
+            .filter(|note| self.comparison.methods.contains(&note.id.as_str()));
+        let own = notes.filter(|note| note.citation.starts_with("This project"));
+        let own: Vec<&str> = own.map(|note| note.id.as_str()).collect();
+        let lead = "Each method simplifies the medial axis of a solid to a number of spheres. Errors are distances between \
+                    the solid and the shape that the result describes.";
+        match own.len() {
+            0 => lead.to_owned(),
+            _ => format!("{lead} Not published, of this project: {}.", own.join(", ")),
+        }
     }
 
     /// Counts of methods, meshes, levels and results, date, version and machine.

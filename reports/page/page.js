@@ -191,6 +191,7 @@ const start = async () => {
   await evaluated("plot");
   const main = document.querySelector("main");
   document.getElementById("facts").append(...report.facts.map((fact) => make("li", {}, fact)));
+  document.getElementById("how").append(make("p", {}, report.lead));
   if (report.command) document.getElementById("how").append(code(report.command));
 
   const isOne = report.meshes.length === 1;
@@ -266,6 +267,9 @@ const start = async () => {
   if (report.site) document.querySelector("nav").append(make("a", { href: "./submissions.html" }, "Hand in results"));
   openTarget();
   document.documentElement.dataset.ready = "";
+  // Pictures from files move what is below them.
+  await Promise.all([...document.images].map((image) => image.decode().catch(() => null)));
+  if (location.hash) openTarget();
 };
 window.addEventListener("hashchange", openTarget);
 window.addEventListener("beforeprint", () => {
