@@ -2,7 +2,7 @@
 //!
 //! 1. Steps at the powers 4 and 8.
 //! 2. Rounds: the places of the largest errors join the samples as witnesses, then steps at the power 16
-//!    or 32 plus `lambda` times the squares. Witnesses are found by local ascent on both sides, and
+//!    or 32 plus `lambda` times the squares. Witnesses are found by local ascent and a sweep on both sides, and
 //!    among the points inside.
 //! 3. Swaps of a few spheres, and later of one, from the best state so far. Only the spheres around them move at
 //!    first; where that lowers the sum of the powers all spheres take a step, and the error is measured. If it is
@@ -104,7 +104,7 @@ impl<'a> Polish<'a> {
             descent.run(Objective::power(power, descent.largest()), steps, self.run)?;
         }
         let mut witnesses = Witnesses::new(self.goal)?;
-        let error = witnesses.measure(&mut descent)?;
+        let error = witnesses.measure(&mut descent, f64::INFINITY)?;
         let (mut best, points) = self.rounds(descent, error, &mut witnesses)?;
         if self.swaps {
             let from = self.at(&best, points)?;
@@ -139,7 +139,7 @@ impl<'a> Polish<'a> {
             let power = POWERS[usize::from(round >= 2)];
             let objective = self.objective(power, error.min(WORSE * best.error));
             descent.run(objective, STEPS, self.run)?;
-            error = witnesses.measure(&mut descent)?;
+            error = witnesses.measure(&mut descent, f64::INFINITY)?;
             idle = if error < (1.0 - GAIN) * best.error { 0 } else { idle + 1 };
             if error < best.error {
                 best = State { mesh: descent.mesh.clone(), error };
@@ -218,10 +218,10 @@ impl<'a> Polish<'a> {
         if !is_below(trial, 1.0) {
             return Ok(f64::INFINITY);
         }
-        let mut error = witnesses.measure(trial)?;
+        let mut error = witnesses.measure(trial, least)?;
         if error >= least && error < CHANCE * least {
             trial.run(objective, AFTER[1], self.run)?;
-            error = witnesses.measure(trial)?;
+            error = witnesses.measure(trial, least)?;
         }
         Ok(error)
     }
@@ -246,11 +246,12 @@ impl<'a> Witnesses<'a> {
         Ok(Self { goal, search, seen: HashSet::new() })
     }
 
-    /// The error of a mesh, both ways. Where it is large, samples join.
-    fn measure(&mut self, descent: &mut Descent<'_>) -> Result<f64> {
+    /// The error of a mesh, both ways. Where it is large, samples join. Both surfaces are swept unless an ascent finds
+    /// an error of `swept_below`.
+    fn measure(&mut self, descent: &mut Descent<'_>, swept_below: f64) -> Result<f64> {
         let Self { goal, search, .. } = self;
         let deep = descent.points.deep;
-        let peaks = search.of(&descent.mesh).map_err(refused)?;
+        let peaks = search.of(&descent.mesh, swept_below).map_err(refused)?;
         let pool: Vec<Vec3> = goal.pool.iter().map(|inside| inside.point).collect();
         let enough = |i: usize| Some(held_from(goal.pool[i].depth.min(deep)));
         let nearest = union_of(&descent.mesh)?.deepest_batch_near(&pool, &[], enough);
