@@ -317,6 +317,10 @@ const STIFF: f64 = 1e12;
 /// Steps that are refused one after the other before the descent ends.
 const REFUSED: usize = 4;
 
+/// Refused steps of a descent after which the spheres that the guard took back are fixed instead of raising the
+/// damping: the other spheres cannot lower the objective where the step relied on these.
+const FIXED: usize = 6;
+
 /// A step that lessens the objective by a smaller share is the last.
 const SMALL: f64 = 2e-2;
 
@@ -389,7 +393,7 @@ pub(super) struct Descent<'a> {
     held: Vec<Held>,
     /// How many of those are spread over the mesh: the others are at places outside.
     spread: usize,
-    /// Spheres that do not move; empty if all do.
+    /// Spheres that do not move.
     fixed: Vec<bool>,
     /// For each sample the distance of everything outside the mesh; may be empty.
     limits: Vec<f64>,
@@ -450,7 +454,8 @@ impl<'a> Descent<'a> {
         mut held: Vec<Held>,
         rest: Rest,
     ) -> Result<Self> {
-        let Rest { fixed, limits, still } = rest;
+        let Rest { mut fixed, limits, still } = rest;
+        fixed.resize(mesh.spheres.len(), false);
         let spread = held.len();
         held.extend(nearest_balls(&mesh, &points.outside)?);
         let residuals = residuals(&mesh, goal, &points, &limits, nearest, 0.0, &mut held);
@@ -528,10 +533,11 @@ impl<'a> Descent<'a> {
         self.residuals.rows.retain(|row| objective.counts(row));
         let mut value = self.value(&objective);
         let (mut done, mut refused, mut growth) = (0, 0, 2.0);
+        let (fixed, mut times_fixed) = (self.fixed.clone(), 0);
         let (mut normal, mut downhill) = self.assemble(&objective);
         while done < steps && refused < REFUSED {
             run.step(done, steps)?;
-            let Some((trial, expected)) = self.trial(&normal, &downhill) else {
+            let Some((trial, expected, taken_back)) = self.trial(&normal, &downhill) else {
                 self.damping *= 10.0;
                 refused += 1;
                 continue;
@@ -557,12 +563,16 @@ impl<'a> Descent<'a> {
                 if done < steps {
                     (normal, downhill) = self.assemble(&objective);
                 }
+            } else if !taken_back.is_empty() && times_fixed < FIXED {
+                taken_back.into_iter().for_each(|v| self.fixed[v as usize] = true);
+                times_fixed += 1;
             } else {
                 self.damping *= growth;
                 growth *= 2.0;
                 refused += 1;
             }
         }
+        self.fixed = fixed;
         self.damping = self.damping.clamp(1e-6, 1.0);
         Ok(())
     }
@@ -596,9 +606,9 @@ impl<'a> Descent<'a> {
         (normal, downhill)
     }
 
-    /// The mesh after a damped step, kept within its limits, and by how much the model lessens the objective;
-    /// `None` if there is no step.
-    fn trial(&self, normal: &Normal, downhill: &[[f64; 4]]) -> Option<(MedialMesh, f64)> {
+    /// The mesh after a damped step, kept within its limits, by how much the model lessens the objective, and the
+    /// spheres that the guard took back; `None` if there is no step.
+    fn trial(&self, normal: &Normal, downhill: &[[f64; 4]]) -> Option<(MedialMesh, f64, Vec<u32>)> {
         let spheres = self.mesh.spheres.len();
         let mut trace = 0.0;
         let mut extra: Vec<[f64; 4]> = (0..spheres as u32)
@@ -612,8 +622,7 @@ impl<'a> Descent<'a> {
         let mean = trace / (4 * spheres) as f64;
         let least = 1e-6 * mean + f64::MIN_POSITIVE;
         extra.iter_mut().flatten().for_each(|entry| *entry += least);
-        let fixed = |v: usize| self.fixed.get(v).copied().unwrap_or(false);
-        for (_, extra) in extra.iter_mut().enumerate().filter(|&(v, _)| fixed(v)) {
+        for (_, extra) in extra.iter_mut().enumerate().filter(|&(v, _)| self.fixed[v]) {
             *extra = [STIFF * mean; 4];
         }
         let step = normal.solve(&self.pattern, &extra, downhill)?;
@@ -622,15 +631,16 @@ impl<'a> Descent<'a> {
             .map(|(h, (down, extra))| 0.5 * h * (down + extra * h))
             .sum();
         let mut trial = self.mesh.clone();
-        let moving = trial.spheres.iter_mut().zip(step).enumerate().filter(|&(v, _)| !fixed(v));
+        let moving = trial.spheres.iter_mut().zip(step).enumerate();
+        let moving = moving.filter(|&(v, _)| !self.fixed[v]);
         for (_, (sphere, [x, y, z, r])) in moving {
             let length = (x * x + y * y + z * z + r * r).sqrt();
             let share = if length > LONGEST { LONGEST / length } else { 1.0 };
             sphere.centre += share * Vec3::new(x, y, z);
             sphere.radius = (sphere.radius + share * r).max(LEAST_RADIUS);
         }
-        self.guard.hold(&self.mesh, &mut trial, self.goal);
-        trial.check().is_ok().then_some((trial, expected))
+        let taken_back = self.guard.hold(&self.mesh, &mut trial, self.goal);
+        trial.check().is_ok().then_some((trial, expected, taken_back))
     }
 }
 
