@@ -413,10 +413,17 @@ pub(super) struct Residuals {
     pub nearest: Vec<NearestPrimitive>,
 }
 
-/// How much an interior point is uncovered, if positive, of a depth that counts.
+/// How much an interior point is uncovered, if positive, of a depth that counts. Of a union that is smaller than the
+/// solid by a length on all sides, no point is uncovered by more than that.
 #[inline]
 pub(super) fn uncovered(depth: f64, signed: f64) -> f64 {
-    (2.0 * signed + depth).max(0.0)
+    (slope(signed) * signed + depth).max(0.0)
+}
+
+/// Its derivative by the signed distance, where it is positive.
+#[inline]
+fn slope(signed: f64) -> f64 {
+    if signed > 0.0 { 1.0 } else { 2.0 }
 }
 
 /// The signed distance from which on an interior point is not uncovered.
@@ -656,7 +663,7 @@ pub(super) fn residuals(
             Some(&Sample { point, weight }) => (point, weight, signed, 1.0),
             None => {
                 let Interior { point, depth, weight } = points.interior[i - count];
-                (point, weight, uncovered(depth.min(points.deep), signed), 2.0)
+                (point, weight, uncovered(depth.min(points.deep), signed), slope(signed))
             }
         };
         if i >= count && error <= 0.0 {

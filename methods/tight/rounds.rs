@@ -324,9 +324,9 @@ const FIXED: usize = 6;
 /// A step that lessens the objective by a smaller share is the last.
 const SMALL: f64 = 2e-2;
 
-/// From this power on, balls may protrude by this share of the scale.
-const HIGH: f64 = 4.0;
-const TOLERATED: f64 = 0.1;
+/// From each of these powers on, balls may protrude by a share of the scale. They have next to no weight there, and
+/// depths are the dearest residuals.
+const TOLERATED: [(f64, f64); 2] = [(16.0, 0.5), (4.0, 0.3)];
 
 /// The objective.
 #[derive(Clone, Copy, Debug)]
@@ -356,7 +356,8 @@ impl Objective {
 
     /// How far a ball may protrude: protrusions without weight at a high power are not searched.
     fn tolerance(&self) -> f64 {
-        if self.power >= HIGH { TOLERATED * self.scale } else { 0.0 }
+        let found = TOLERATED.iter().find(|&&(power, _)| self.power >= power);
+        found.map_or(0.0, |&(_, share)| share * self.scale)
     }
 
     fn counts(&self, row: &Row) -> bool {
