@@ -593,7 +593,7 @@ pub(super) fn settle(
     before: &Descent<'_>,
     mesh: &mut MedialMesh,
     of: &[Option<u32>],
-    stages: &[(f64, usize)],
+    stages: &[(i32, usize)],
     run: &RunContext,
 ) -> Result<()> {
     let moving = around(mesh, of);

@@ -46,7 +46,7 @@ const CLOSEST: f64 = 1e-3;
 const INTERIOR: usize = 4_000;
 
 /// Interior points among which uncovered ones are looked for.
-const POOL: usize = 60_000;
+const POOL: usize = 20_000;
 
 /// Cells along the longest side of the grid in which interior points are laid out.
 const GRID: usize = 40;
@@ -369,12 +369,11 @@ pub(super) const DEEP: f64 = 0.02;
 /// Weight of a point of the medial mesh whose ball may protrude.
 const PROTRUDING: f64 = 0.3;
 
-/// Points of the medial mesh at which balls are watched for protruding. At 100 spheres twice as many gave the same errors.
-const HELD: usize = 3_000;
+/// Points of the medial mesh at which balls are watched for protruding. Twice as many gave the same errors.
+const HELD: usize = 1_500;
 
-/// How much farther than needed the depth of a ball is looked for, in ways that it moved last: the next steps are
-/// mostly no longer.
-const FARTHER: f64 = 2.0;
+/// How much farther than needed the depth of a ball is looked for, in ways that it moved last.
+const FARTHER: f64 = 0.5;
 
 /// Golden ratio's fractional part, and the two of the plastic number: steps of the sequences.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;

@@ -2,7 +2,7 @@
 //!
 //! 1. Steps at the powers 4 and 8.
 //! 2. Rounds: the places of the largest errors join the samples as witnesses, then steps at the power 16
-//!    or 32 plus `lambda` times the squares. Witnesses are found by local ascent and a sweep on both sides, and
+//!    or 32 plus `lambda` times the mean. Witnesses are found by local ascent and a sweep on both sides, and
 //!    among the points inside.
 //! 3. Swaps of a few spheres, and later of one, from the best state so far. Only the spheres around them move at
 //!    first; where that lowers the sum of the powers all spheres take a step, and the error is measured. If it is
@@ -29,10 +29,10 @@ use super::start::swapped;
 use crate::Result;
 
 /// Powers and steps before the first round.
-const WARM: [(f64, usize); 2] = [(4.0, 9), (8.0, 14)];
+const WARM: [(i32, usize); 2] = [(4, 9), (8, 14)];
 
 /// Power of the first two rounds, and of all others.
-const POWERS: [f64; 2] = [16.0, 32.0];
+const POWERS: [i32; 2] = [16, 32];
 
 /// Steps of a round.
 const STEPS: usize = 8;
@@ -57,8 +57,8 @@ const WORSE: f64 = 1.15;
 const PATIENCE: usize = 2;
 
 /// Most swaps that are tried, and swaps without a gain, one after the other, that end the search.
-const SWAPS: usize = 40;
-const FAILURES: usize = 8;
+const SWAPS: usize = 24;
+const FAILURES: usize = 6;
 
 /// One of this number of spheres is swapped at first, later fewer, and then one at a time.
 const SPHERES: usize = 25;
@@ -227,7 +227,7 @@ impl<'a> Polish<'a> {
     }
 
     /// A little below the error counts as one, so that larger ones weigh heavily.
-    fn objective(&self, power: f64, error: f64) -> Objective {
+    fn objective(&self, power: i32, error: f64) -> Objective {
         Objective { power, mean: self.params.lambda, scale: 0.9 * error }
     }
 }
@@ -299,7 +299,8 @@ impl<'a> Witnesses<'a> {
 // ----------------------------------------------------------------------------
 // Levenberg-Marquardt on all spheres at once, for sums of powers of the residuals.
 //
-// Minimises `sum_i w_i (x_i^p + mean x_i^2)` with `x = |error| / scale`. The second derivative of a power
+// Minimises `sum_i w_i (x_i^p + mean h(x_i))` with `x = |error| / scale` and `h(x) = (x^2 + d^2)^(1/2) - d`, the error
+// itself but for small ones. With squares the mean error was a little larger. The second derivative of a power
 // keeps its factor `p - 1`, so a step is Newton's for residuals that are linear in the spheres.
 
 /// Largest step of a sphere.
@@ -326,14 +327,21 @@ const SMALL: f64 = 2e-2;
 
 /// From each of these powers on, balls may protrude by a share of the scale. They have next to no weight there, and
 /// depths are the dearest residuals.
-const TOLERATED: [(f64, f64); 2] = [(16.0, 0.5), (4.0, 0.3)];
+const TOLERATED: [(i32, f64); 2] = [(16, 0.5), (4, 0.3)];
+
+/// Errors that are small by this share of the scale count with their squares in the mean.
+const ROUNDED: f64 = 0.2;
+
+fn rounded(x: f64) -> f64 {
+    (x * x + ROUNDED * ROUNDED).sqrt()
+}
 
 /// The objective.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Objective {
     /// Exponent, at least 2.
-    pub power: f64,
-    /// Weight of the squares.
+    pub power: i32,
+    /// Weight of the mean error.
     pub mean: f64,
     /// Error that counts as 1.
     pub scale: f64,
@@ -341,7 +349,7 @@ pub(super) struct Objective {
 
 impl Objective {
     /// A power alone.
-    pub fn power(power: f64, scale: f64) -> Self {
+    pub fn power(power: i32, scale: f64) -> Self {
         Self { power, mean: 0.0, scale }
     }
 
@@ -349,7 +357,7 @@ impl Objective {
         let Self { power, mean, scale } = *self;
         let counted = rows.iter().filter(|row| self.counts(row)).map(|row| {
             let x = row.error.abs() / scale;
-            row.weight * (x.powf(power) + mean * x * x)
+            row.weight * (x.powi(power) + mean * (rounded(x) - ROUNDED))
         });
         counted.sum()
     }
@@ -368,9 +376,11 @@ impl Objective {
     fn derivatives(&self, row: &Row) -> (f64, f64) {
         let Self { power, mean, scale } = *self;
         let x = row.error.abs() / scale;
-        let steep = power * x.powf(power - 2.0);
+        let steep = f64::from(power) * x.powi(power - 2);
         let unit = row.weight / (scale * scale);
-        (unit * (steep + 2.0 * mean), unit * (steep * (power - 1.0) + 2.0 * mean))
+        // Of the mean the curvature that keeps its model above it.
+        let flat = mean / rounded(x);
+        (unit * (steep + flat), unit * (steep * f64::from(power - 1) + flat))
     }
 }
 

@@ -22,7 +22,7 @@ use rayon::prelude::*;
 
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::hausdorff::{BURIAL, EXPOSED};
-use super::samples::{Pose, SurfaceSamples};
+use super::samples::{Pose, SEEDS, SurfaceSamples};
 use super::sweep::swept;
 use super::{DistanceOptions, MetricError};
 use crate::Vec3;
@@ -271,7 +271,8 @@ impl<'a> PeakSearch<'a> {
         let pose = &samples.pose;
         let mut sigma = union.signed_batch(&samples.points);
         sigma.iter_mut().for_each(|value| *value = value.abs());
-        let start = samples.start(&sigma);
+        // Fewer seeds than for a final figure: searches are many, and the sweep adds to them.
+        let start = Start { seeds: SEEDS / 3, ..samples.start(&sigma) };
         let on_mesh =
             OnMesh { mesh: tree, value: |p, near: &mut usize| union.signed_from(p, near).abs() };
         let forward = ascend(&on_mesh, &start);
