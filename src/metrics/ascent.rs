@@ -390,7 +390,10 @@ mod tests {
         let ball = Sphere::new(Vec3::new(0.5, 0.5, 0.4), 0.5);
         let mesh = MedialMesh::from_simplices(vec![ball], vec![], vec![]).unwrap();
         let options = DistanceOptions { surface_samples: 500, envelope_samples: 500, seed: 3 };
-        let peaks = PeakSearch::new(&surface, &tree, options).unwrap().of(&mesh, 0.0).unwrap();
+        let search = PeakSearch::new(&surface, &tree, options).unwrap();
+        let peaks = search.of(&mesh, 0.0).unwrap();
+        let swept = search.of(&mesh, f64::INFINITY).unwrap();
+        assert!(swept.hausdorff() >= peaks.hausdorff());
         // The corners above are farthest, and the ball protrudes by a tenth below.
         let corner = Vec3::new(0.5, 0.5, 0.6).length() - 0.5;
         assert!((peaks.forward[0].distance - corner).abs() < 1e-12, "{:?}", peaks.forward[0]);
@@ -399,7 +402,9 @@ mod tests {
         assert!((peaks.hausdorff() - measured.hausdorff).abs() < 1e-9);
         assert_eq!(peaks.reverse[0].distance, measured.reverse);
         let descends = |peaks: &[Peak]| peaks.is_sorted_by(|a, b| a.distance >= b.distance);
-        assert!(descends(&peaks.forward) && descends(&peaks.reverse));
+        for found in [&peaks, &swept] {
+            assert!(descends(&found.forward) && descends(&found.reverse));
+        }
         for peak in &peaks.reverse {
             assert!(ball.signed_distance(peak.point).abs() < 1e-9);
         }
