@@ -501,11 +501,12 @@ impl Guard {
     }
 
     /// Brings a step within its limits: centres outside are clamped, and the corners of faces that would fold
-    /// over, or come to cross another one, go half the way, a quarter, or stay where they were.
-    pub fn hold(&self, before: &MedialMesh, after: &mut MedialMesh, goal: &Goal) {
+    /// over, or come to cross another one, go half the way, a quarter, or stay where they were. Returns these corners,
+    /// in ascending order.
+    pub fn hold(&self, before: &MedialMesh, after: &mut MedialMesh, goal: &Goal) -> Vec<u32> {
         clamp(after, goal);
         if self.is_tangled {
-            return;
+            return vec![];
         }
         // Taking one vertex back can fold another face of it. This ends: with all taken back the mesh is as before.
         let mut halvings = vec![0; before.spheres.len()];
@@ -542,6 +543,7 @@ impl Guard {
                 *new = if is_inside { half } else { old };
             }
         }
+        (0..).zip(halvings).filter(|&(_, halvings)| halvings > 0).map(|(v, _)| v).collect()
     }
 
     /// The pairs with a face of the mesh for which `is_chosen`.
@@ -591,7 +593,7 @@ pub(super) fn settle(
     before: &Descent<'_>,
     mesh: &mut MedialMesh,
     of: &[Option<u32>],
-    stages: &[(f64, usize)],
+    stages: &[(i32, usize)],
     run: &RunContext,
 ) -> Result<()> {
     let moving = around(mesh, of);

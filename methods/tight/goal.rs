@@ -46,7 +46,7 @@ const CLOSEST: f64 = 1e-3;
 const INTERIOR: usize = 4_000;
 
 /// Interior points among which uncovered ones are looked for.
-const POOL: usize = 60_000;
+const POOL: usize = 20_000;
 
 /// Cells along the longest side of the grid in which interior points are laid out.
 const GRID: usize = 40;
@@ -369,12 +369,11 @@ pub(super) const DEEP: f64 = 0.02;
 /// Weight of a point of the medial mesh whose ball may protrude.
 const PROTRUDING: f64 = 0.3;
 
-/// Points of the medial mesh at which balls are watched for protruding. At 100 spheres twice as many gave the same errors.
-const HELD: usize = 3_000;
+/// Points of the medial mesh at which balls are watched for protruding. Twice as many gave the same errors.
+const HELD: usize = 1_500;
 
-/// How much farther than needed the depth of a ball is looked for, in ways that it moved last: the next steps are
-/// mostly no longer.
-const FARTHER: f64 = 2.0;
+/// How much farther than needed the depth of a ball is looked for, in ways that it moved last.
+const FARTHER: f64 = 0.5;
 
 /// Golden ratio's fractional part, and the two of the plastic number: steps of the sequences.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -413,10 +412,17 @@ pub(super) struct Residuals {
     pub nearest: Vec<NearestPrimitive>,
 }
 
-/// How much an interior point is uncovered, if positive, of a depth that counts.
+/// How much an interior point is uncovered, if positive, of a depth that counts. Of a union that is smaller than the
+/// solid by a length on all sides, no point is uncovered by more than that.
 #[inline]
 pub(super) fn uncovered(depth: f64, signed: f64) -> f64 {
-    (2.0 * signed + depth).max(0.0)
+    (slope(signed) * signed + depth).max(0.0)
+}
+
+/// Its derivative by the signed distance, where it is positive.
+#[inline]
+fn slope(signed: f64) -> f64 {
+    if signed > 0.0 { 1.0 } else { 2.0 }
 }
 
 /// The signed distance from which on an interior point is not uncovered.
@@ -656,7 +662,7 @@ pub(super) fn residuals(
             Some(&Sample { point, weight }) => (point, weight, signed, 1.0),
             None => {
                 let Interior { point, depth, weight } = points.interior[i - count];
-                (point, weight, uncovered(depth.min(points.deep), signed), 2.0)
+                (point, weight, uncovered(depth.min(points.deep), signed), slope(signed))
             }
         };
         if i >= count && error <= 0.0 {

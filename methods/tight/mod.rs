@@ -80,7 +80,7 @@ const MANY: usize = 3;
 
 /// The power until the last rounds. With squares, the steps after a pass let a single ball protrude ever farther,
 /// up to faces across a hole.
-const POWER: f64 = 4.0;
+const POWER: i32 = 4;
 
 /// The share of spheres that a pass leaves, far from the target and near to it.
 const LEFT: [f64; 2] = [0.4, 0.6];
@@ -103,7 +103,6 @@ pub struct Tight {
 /// [`Level::Native`], a bound of the two-sided error, at two to three times that.
 pub fn method(starter: impl MedialSimplifier + 'static) -> Tight {
     let info = MethodInfo::new("tight", "Tight")
-        .seeded()
         .citation("This project; not published.")
         .summary(
             "Collapses and inserts spheres in the order of the two-sided error at samples, and moves all \
@@ -241,7 +240,7 @@ fn passed<'a>(
 fn swapped_often<'a>(mut descent: Descent<'a>, run: &RunContext) -> Result<Descent<'a>> {
     let mut each = (descent.mesh.spheres.len() / 12).max(2);
     descent.run(Objective::power(POWER, descent.largest()), STEPS[1], run)?;
-    let judge = Objective::power(8.0, descent.largest());
+    let judge = Objective::power(8, descent.largest());
     for _ in 0..SWAPS {
         let trial = start::swapped(&descent, each, 0, run)?;
         match trial.filter(|trial| trial.value(&judge) < descent.value(&judge)) {
@@ -260,10 +259,10 @@ medial::parameters! {
     /// Parameters of `tight`.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct TightParams {
-        /// Weight of the mean of the squares next to the high powers: larger for a smaller mean error.
-        lambda: f64 = 0.4, "pure number";
+        /// Weight of the mean error next to the high powers: larger for a smaller mean error.
+        lambda: f64 = 0.6, "pure number";
         /// Spheres that the start is simplified to, unless five times the target, up to 2,500, or three times it are more.
-        start: usize = 1_200, "spheres";
+        start: usize = 800, "spheres";
         /// Samples of the initial medial mesh at least; a coarse surface gets more.
         samples: usize = 5_000, "samples";
         /// Rounds of steps at high powers before each further one begins with a swap.

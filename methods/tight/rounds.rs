@@ -2,7 +2,7 @@
 //!
 //! 1. Steps at the powers 4 and 8.
 //! 2. Rounds: the places of the largest errors join the samples as witnesses, then steps at the power 16
-//!    or 32 plus `lambda` times the squares. Witnesses are found by local ascent on both sides, and
+//!    or 32 plus `lambda` times the mean. Witnesses are found by local ascent and a sweep on both sides, and
 //!    among the points inside.
 //! 3. Swaps of a few spheres, and later of one, from the best state so far. Only the spheres around them move at
 //!    first; where that lowers the sum of the powers all spheres take a step, and the error is measured. If it is
@@ -29,10 +29,10 @@ use super::start::swapped;
 use crate::Result;
 
 /// Powers and steps before the first round.
-const WARM: [(f64, usize); 2] = [(4.0, 9), (8.0, 14)];
+const WARM: [(i32, usize); 2] = [(4, 9), (8, 14)];
 
 /// Power of the first two rounds, and of all others.
-const POWERS: [f64; 2] = [16.0, 32.0];
+const POWERS: [i32; 2] = [16, 32];
 
 /// Steps of a round.
 const STEPS: usize = 8;
@@ -57,8 +57,8 @@ const WORSE: f64 = 1.15;
 const PATIENCE: usize = 2;
 
 /// Most swaps that are tried, and swaps without a gain, one after the other, that end the search.
-const SWAPS: usize = 40;
-const FAILURES: usize = 8;
+const SWAPS: usize = 24;
+const FAILURES: usize = 6;
 
 /// One of this number of spheres is swapped at first, later fewer, and then one at a time.
 const SPHERES: usize = 25;
@@ -104,7 +104,7 @@ impl<'a> Polish<'a> {
             descent.run(Objective::power(power, descent.largest()), steps, self.run)?;
         }
         let mut witnesses = Witnesses::new(self.goal)?;
-        let error = witnesses.measure(&mut descent)?;
+        let error = witnesses.measure(&mut descent, f64::INFINITY)?;
         let (mut best, points) = self.rounds(descent, error, &mut witnesses)?;
         if self.swaps {
             let from = self.at(&best, points)?;
@@ -139,7 +139,7 @@ impl<'a> Polish<'a> {
             let power = POWERS[usize::from(round >= 2)];
             let objective = self.objective(power, error.min(WORSE * best.error));
             descent.run(objective, STEPS, self.run)?;
-            error = witnesses.measure(&mut descent)?;
+            error = witnesses.measure(&mut descent, f64::INFINITY)?;
             idle = if error < (1.0 - GAIN) * best.error { 0 } else { idle + 1 };
             if error < best.error {
                 best = State { mesh: descent.mesh.clone(), error };
@@ -218,16 +218,16 @@ impl<'a> Polish<'a> {
         if !is_below(trial, 1.0) {
             return Ok(f64::INFINITY);
         }
-        let mut error = witnesses.measure(trial)?;
+        let mut error = witnesses.measure(trial, least)?;
         if error >= least && error < CHANCE * least {
             trial.run(objective, AFTER[1], self.run)?;
-            error = witnesses.measure(trial)?;
+            error = witnesses.measure(trial, least)?;
         }
         Ok(error)
     }
 
     /// A little below the error counts as one, so that larger ones weigh heavily.
-    fn objective(&self, power: f64, error: f64) -> Objective {
+    fn objective(&self, power: i32, error: f64) -> Objective {
         Objective { power, mean: self.params.lambda, scale: 0.9 * error }
     }
 }
@@ -246,11 +246,12 @@ impl<'a> Witnesses<'a> {
         Ok(Self { goal, search, seen: HashSet::new() })
     }
 
-    /// The error of a mesh, both ways. Where it is large, samples join.
-    fn measure(&mut self, descent: &mut Descent<'_>) -> Result<f64> {
+    /// The error of a mesh, both ways. Where it is large, samples join. Both surfaces are swept unless an ascent finds
+    /// an error of `swept_below`.
+    fn measure(&mut self, descent: &mut Descent<'_>, swept_below: f64) -> Result<f64> {
         let Self { goal, search, .. } = self;
         let deep = descent.points.deep;
-        let peaks = search.of(&descent.mesh).map_err(refused)?;
+        let peaks = search.of(&descent.mesh, swept_below).map_err(refused)?;
         let pool: Vec<Vec3> = goal.pool.iter().map(|inside| inside.point).collect();
         let enough = |i: usize| Some(held_from(goal.pool[i].depth.min(deep)));
         let nearest = union_of(&descent.mesh)?.deepest_batch_near(&pool, &[], enough);
@@ -298,7 +299,8 @@ impl<'a> Witnesses<'a> {
 // ----------------------------------------------------------------------------
 // Levenberg-Marquardt on all spheres at once, for sums of powers of the residuals.
 //
-// Minimises `sum_i w_i (x_i^p + mean x_i^2)` with `x = |error| / scale`. The second derivative of a power
+// Minimises `sum_i w_i (x_i^p + mean h(x_i))` with `x = |error| / scale` and `h(x) = (x^2 + d^2)^(1/2) - d`, the error
+// itself but for small ones. With squares the mean error was a little larger. The second derivative of a power
 // keeps its factor `p - 1`, so a step is Newton's for residuals that are linear in the spheres.
 
 /// Largest step of a sphere.
@@ -316,19 +318,30 @@ const STIFF: f64 = 1e12;
 /// Steps that are refused one after the other before the descent ends.
 const REFUSED: usize = 4;
 
+/// Refused steps of a descent after which the spheres that the guard took back are fixed instead of raising the
+/// damping: the other spheres cannot lower the objective where the step relied on these.
+const FIXED: usize = 6;
+
 /// A step that lessens the objective by a smaller share is the last.
 const SMALL: f64 = 2e-2;
 
-/// From this power on, balls may protrude by this share of the scale.
-const HIGH: f64 = 4.0;
-const TOLERATED: f64 = 0.1;
+/// From each of these powers on, balls may protrude by a share of the scale. They have next to no weight there, and
+/// depths are the dearest residuals.
+const TOLERATED: [(i32, f64); 2] = [(16, 0.5), (4, 0.3)];
+
+/// Errors that are small by this share of the scale count with their squares in the mean.
+const ROUNDED: f64 = 0.2;
+
+fn rounded(x: f64) -> f64 {
+    (x * x + ROUNDED * ROUNDED).sqrt()
+}
 
 /// The objective.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Objective {
     /// Exponent, at least 2.
-    pub power: f64,
-    /// Weight of the squares.
+    pub power: i32,
+    /// Weight of the mean error.
     pub mean: f64,
     /// Error that counts as 1.
     pub scale: f64,
@@ -336,7 +349,7 @@ pub(super) struct Objective {
 
 impl Objective {
     /// A power alone.
-    pub fn power(power: f64, scale: f64) -> Self {
+    pub fn power(power: i32, scale: f64) -> Self {
         Self { power, mean: 0.0, scale }
     }
 
@@ -344,14 +357,15 @@ impl Objective {
         let Self { power, mean, scale } = *self;
         let counted = rows.iter().filter(|row| self.counts(row)).map(|row| {
             let x = row.error.abs() / scale;
-            row.weight * (x.powf(power) + mean * x * x)
+            row.weight * (x.powi(power) + mean * (rounded(x) - ROUNDED))
         });
         counted.sum()
     }
 
     /// How far a ball may protrude: protrusions without weight at a high power are not searched.
     fn tolerance(&self) -> f64 {
-        if self.power >= HIGH { TOLERATED * self.scale } else { 0.0 }
+        let found = TOLERATED.iter().find(|&&(power, _)| self.power >= power);
+        found.map_or(0.0, |&(_, share)| share * self.scale)
     }
 
     fn counts(&self, row: &Row) -> bool {
@@ -362,9 +376,11 @@ impl Objective {
     fn derivatives(&self, row: &Row) -> (f64, f64) {
         let Self { power, mean, scale } = *self;
         let x = row.error.abs() / scale;
-        let steep = power * x.powf(power - 2.0);
+        let steep = f64::from(power) * x.powi(power - 2);
         let unit = row.weight / (scale * scale);
-        (unit * (steep + 2.0 * mean), unit * (steep * (power - 1.0) + 2.0 * mean))
+        // Of the mean the curvature that keeps its model above it.
+        let flat = mean / rounded(x);
+        (unit * (steep + flat), unit * (steep * f64::from(power - 1) + flat))
     }
 }
 
@@ -388,7 +404,7 @@ pub(super) struct Descent<'a> {
     held: Vec<Held>,
     /// How many of those are spread over the mesh: the others are at places outside.
     spread: usize,
-    /// Spheres that do not move; empty if all do.
+    /// Spheres that do not move.
     fixed: Vec<bool>,
     /// For each sample the distance of everything outside the mesh; may be empty.
     limits: Vec<f64>,
@@ -449,7 +465,8 @@ impl<'a> Descent<'a> {
         mut held: Vec<Held>,
         rest: Rest,
     ) -> Result<Self> {
-        let Rest { fixed, limits, still } = rest;
+        let Rest { mut fixed, limits, still } = rest;
+        fixed.resize(mesh.spheres.len(), false);
         let spread = held.len();
         held.extend(nearest_balls(&mesh, &points.outside)?);
         let residuals = residuals(&mesh, goal, &points, &limits, nearest, 0.0, &mut held);
@@ -527,10 +544,11 @@ impl<'a> Descent<'a> {
         self.residuals.rows.retain(|row| objective.counts(row));
         let mut value = self.value(&objective);
         let (mut done, mut refused, mut growth) = (0, 0, 2.0);
+        let (fixed, mut times_fixed) = (self.fixed.clone(), 0);
         let (mut normal, mut downhill) = self.assemble(&objective);
         while done < steps && refused < REFUSED {
             run.step(done, steps)?;
-            let Some((trial, expected)) = self.trial(&normal, &downhill) else {
+            let Some((trial, expected, taken_back)) = self.trial(&normal, &downhill) else {
                 self.damping *= 10.0;
                 refused += 1;
                 continue;
@@ -556,12 +574,16 @@ impl<'a> Descent<'a> {
                 if done < steps {
                     (normal, downhill) = self.assemble(&objective);
                 }
+            } else if !taken_back.is_empty() && times_fixed < FIXED {
+                taken_back.into_iter().for_each(|v| self.fixed[v as usize] = true);
+                times_fixed += 1;
             } else {
                 self.damping *= growth;
                 growth *= 2.0;
                 refused += 1;
             }
         }
+        self.fixed = fixed;
         self.damping = self.damping.clamp(1e-6, 1.0);
         Ok(())
     }
@@ -595,9 +617,9 @@ impl<'a> Descent<'a> {
         (normal, downhill)
     }
 
-    /// The mesh after a damped step, kept within its limits, and by how much the model lessens the objective;
-    /// `None` if there is no step.
-    fn trial(&self, normal: &Normal, downhill: &[[f64; 4]]) -> Option<(MedialMesh, f64)> {
+    /// The mesh after a damped step, kept within its limits, by how much the model lessens the objective, and the
+    /// spheres that the guard took back; `None` if there is no step.
+    fn trial(&self, normal: &Normal, downhill: &[[f64; 4]]) -> Option<(MedialMesh, f64, Vec<u32>)> {
         let spheres = self.mesh.spheres.len();
         let mut trace = 0.0;
         let mut extra: Vec<[f64; 4]> = (0..spheres as u32)
@@ -611,8 +633,7 @@ impl<'a> Descent<'a> {
         let mean = trace / (4 * spheres) as f64;
         let least = 1e-6 * mean + f64::MIN_POSITIVE;
         extra.iter_mut().flatten().for_each(|entry| *entry += least);
-        let fixed = |v: usize| self.fixed.get(v).copied().unwrap_or(false);
-        for (_, extra) in extra.iter_mut().enumerate().filter(|&(v, _)| fixed(v)) {
+        for (_, extra) in extra.iter_mut().enumerate().filter(|&(v, _)| self.fixed[v]) {
             *extra = [STIFF * mean; 4];
         }
         let step = normal.solve(&self.pattern, &extra, downhill)?;
@@ -621,15 +642,16 @@ impl<'a> Descent<'a> {
             .map(|(h, (down, extra))| 0.5 * h * (down + extra * h))
             .sum();
         let mut trial = self.mesh.clone();
-        let moving = trial.spheres.iter_mut().zip(step).enumerate().filter(|&(v, _)| !fixed(v));
+        let moving = trial.spheres.iter_mut().zip(step).enumerate();
+        let moving = moving.filter(|&(v, _)| !self.fixed[v]);
         for (_, (sphere, [x, y, z, r])) in moving {
             let length = (x * x + y * y + z * z + r * r).sqrt();
             let share = if length > LONGEST { LONGEST / length } else { 1.0 };
             sphere.centre += share * Vec3::new(x, y, z);
             sphere.radius = (sphere.radius + share * r).max(LEAST_RADIUS);
         }
-        self.guard.hold(&self.mesh, &mut trial, self.goal);
-        trial.check().is_ok().then_some((trial, expected))
+        let taken_back = self.guard.hold(&self.mesh, &mut trial, self.goal);
+        trial.check().is_ok().then_some((trial, expected, taken_back))
     }
 }
 

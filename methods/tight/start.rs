@@ -238,8 +238,8 @@ const AT_END: f64 = 0.95;
 const UNUSED: f64 = 0.05;
 
 /// Powers and steps around insertions, and around collapses.
-const INSERTED: [(f64, usize); 1] = [(8.0, 6)];
-const COLLAPSED: [(f64, usize); 2] = [(8.0, 5), (16.0, 5)];
+const INSERTED: [(i32, usize); 1] = [(8, 6)];
+const COLLAPSED: [(i32, usize); 2] = [(8, 5), (16, 5)];
 
 /// A mesh with as many spheres, up to `each` of them at other places, the `skipped` worst of which are left
 /// as they are; `None` if nothing can be inserted, or not as much be collapsed.

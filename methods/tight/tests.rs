@@ -131,7 +131,7 @@ fn a_descent_never_raises_its_objective_and_keeps_centres_inside() {
     let shape = shape("bracket", 6);
     let goal = Goal::new(&shape, 0).unwrap();
     let mut descent = Descent::new(&goal, goal.points(40), start(&shape, 40)).unwrap();
-    let objective = Objective::power(4.0, descent.largest());
+    let objective = Objective::power(4, descent.largest());
     let mut before = descent.value(&objective);
     for _ in 0..6 {
         descent.run(objective, 1, &RunContext::default()).unwrap();
@@ -215,7 +215,7 @@ fn around_a_place_the_error_falls_and_elsewhere_nothing_moves() {
     let mut mesh = before.mesh.clone();
     let of: Vec<_> =
         (0..mesh.spheres.len() as u32).map(|v| (v != corners[0]).then_some(v)).collect();
-    settle(&before, &mut mesh, &of, &[(4.0, 5)], &run).unwrap();
+    settle(&before, &mut mesh, &of, &[(4, 5)], &run).unwrap();
     // A neighbour moves, a sphere two edges away does not.
     let mut near = vec![false; mesh.spheres.len()];
     near[corners[0] as usize] = true;
@@ -227,7 +227,7 @@ fn around_a_place_the_error_falls_and_elsewhere_nothing_moves() {
     assert!(moved.iter().zip(&near).all(|(&moved, &near)| near || !moved), "{moved:?} {near:?}");
     assert!(moved[corners[0] as usize] && near.contains(&false));
     // Of the whole, too: the rest was in the sums.
-    let objective = Objective::power(4.0, before.largest());
+    let objective = Objective::power(4, before.largest());
     let after = Descent::new(&goal, before.points.clone(), mesh).unwrap();
     let (before, after) = (before.value(&objective), after.value(&objective));
     assert!(after < before, "{after} after {before}");
@@ -303,7 +303,7 @@ fn points_that_join_count_as_if_they_had_been_there() {
     let mesh = start(&shape, 30);
     let at_once = Descent::new(&goal, all, mesh.clone()).unwrap();
     let mut joined = Descent::new(&goal, fewer, mesh).unwrap();
-    let objective = Objective::power(4.0, 0.01);
+    let objective = Objective::power(4, 0.01);
     assert!(joined.value(&objective) < 0.9 * at_once.value(&objective));
     joined.join_new_of(&at_once.points).unwrap();
     let [a, b] = [&joined, &at_once].map(|descent| descent.value(&objective));

@@ -22,7 +22,8 @@ use rayon::prelude::*;
 
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::hausdorff::{BURIAL, EXPOSED};
-use super::samples::{Pose, SurfaceSamples};
+use super::samples::{Pose, SEEDS, SurfaceSamples};
+use super::sweep::swept;
 use super::{DistanceOptions, MetricError};
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion};
@@ -236,6 +237,7 @@ impl Peaks {
 
 /// A surface whose samples are laid out once, to be searched with many medial meshes.
 pub struct PeakSearch<'a> {
+    surface: &'a TriMesh,
     tree: &'a TriangleBvh,
     samples: SurfaceSamples,
     options: DistanceOptions,
@@ -247,31 +249,33 @@ impl<'a> PeakSearch<'a> {
     /// # Errors
     /// When the surface has no area, or no samples are requested.
     pub fn new(
-        surface: &TriMesh,
+        surface: &'a TriMesh,
         tree: &'a TriangleBvh,
         options: DistanceOptions,
     ) -> Result<Self, MetricError> {
         let samples = SurfaceSamples::new(surface, options.surface_samples, options.seed)?;
-        Ok(Self { tree, samples, options })
+        Ok(Self { surface, tree, samples, options })
     }
 
-    /// The samples with the largest distances, and the points that local ascent reaches from them.
+    /// The samples with the largest distances, and the points that local ascent reaches from them. If none of them is
+    /// at least `swept_below` away, both surfaces are swept for larger distances.
     ///
     /// The distances are those of [`crate::metrics::distances`], whose maximum also counts an ascent of `mu` and
     /// can be a little larger.
     ///
     /// # Errors
     /// When the medial mesh is empty or not valid, or no samples are requested.
-    pub fn of(&self, mesh: &MedialMesh) -> Result<Peaks, MetricError> {
-        let Self { tree, samples, options } = self;
+    pub fn of(&self, mesh: &MedialMesh, swept_below: f64) -> Result<Peaks, MetricError> {
+        let Self { surface, tree, samples, options } = self;
         let (mesh, union) = samples.ordered(mesh)?;
         let pose = &samples.pose;
         let mut sigma = union.signed_batch(&samples.points);
         sigma.iter_mut().for_each(|value| *value = value.abs());
-        let forward = ascend(
-            &OnMesh { mesh: tree, value: |p, near: &mut usize| union.signed_from(p, near).abs() },
-            &samples.start(&sigma),
-        );
+        // Fewer seeds than for a final figure: searches are many, and the sweep adds to them.
+        let start = Start { seeds: SEEDS / 3, ..samples.start(&sigma) };
+        let on_mesh =
+            OnMesh { mesh: tree, value: |p, near: &mut usize| union.signed_from(p, near).abs() };
+        let forward = ascend(&on_mesh, &start);
         let envelope = EnvelopeOptions {
             samples: options.envelope_samples,
             burial: BURIAL * pose.diameter(),
@@ -280,12 +284,19 @@ impl<'a> PeakSearch<'a> {
         let points = sample_envelope_in(pose, &mesh, &union, &envelope)?.points;
         let values = tree.distance_batch(&points);
         let hill = OnUnion { union: &union, surface: tree, burial: EXPOSED * pose.diameter() };
-        let start = samples.start(&sigma);
         let reverse = ascend(&hill, &Start { points: &points, values: &values, ..start });
-        Ok(Peaks {
+        let mut peaks = Peaks {
             forward: sorted(forward, &samples.points, &sigma),
             reverse: sorted(reverse, &points, &values),
-        })
+        };
+        let known = peaks.hausdorff();
+        if known < swept_below {
+            let [forward, reverse] =
+                swept((surface, tree), (&mesh, &union), (&on_mesh, &hill), &start, known);
+            peaks.forward = sorted(forward, &[], &[]).into_iter().chain(peaks.forward).collect();
+            peaks.reverse = sorted(reverse, &[], &[]).into_iter().chain(peaks.reverse).collect();
+        }
+        Ok(peaks)
     }
 }
 
@@ -379,7 +390,10 @@ mod tests {
         let ball = Sphere::new(Vec3::new(0.5, 0.5, 0.4), 0.5);
         let mesh = MedialMesh::from_simplices(vec![ball], vec![], vec![]).unwrap();
         let options = DistanceOptions { surface_samples: 500, envelope_samples: 500, seed: 3 };
-        let peaks = PeakSearch::new(&surface, &tree, options).unwrap().of(&mesh).unwrap();
+        let search = PeakSearch::new(&surface, &tree, options).unwrap();
+        let peaks = search.of(&mesh, 0.0).unwrap();
+        let swept = search.of(&mesh, f64::INFINITY).unwrap();
+        assert!(swept.hausdorff() >= peaks.hausdorff());
         // The corners above are farthest, and the ball protrudes by a tenth below.
         let corner = Vec3::new(0.5, 0.5, 0.6).length() - 0.5;
         assert!((peaks.forward[0].distance - corner).abs() < 1e-12, "{:?}", peaks.forward[0]);
@@ -388,7 +402,9 @@ mod tests {
         assert!((peaks.hausdorff() - measured.hausdorff).abs() < 1e-9);
         assert_eq!(peaks.reverse[0].distance, measured.reverse);
         let descends = |peaks: &[Peak]| peaks.is_sorted_by(|a, b| a.distance >= b.distance);
-        assert!(descends(&peaks.forward) && descends(&peaks.reverse));
+        for found in [&peaks, &swept] {
+            assert!(descends(&found.forward) && descends(&found.reverse));
+        }
         for peak in &peaks.reverse {
             assert!(ball.signed_distance(peak.point).abs() < 1e-9);
         }

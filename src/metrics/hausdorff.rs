@@ -27,10 +27,9 @@
 
 use super::Distances;
 use super::ascent::{OnMesh, OnUnion, Peak, Start, ascend};
-use super::certificate::Hulls;
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::samples::{SEEDS, SurfaceSamples};
-use super::sweep::{SweptSurface, SweptUnion, peaks_above};
+use super::sweep::swept;
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, UnionError};
 use crate::geometry::TriangulationError;
@@ -168,15 +167,12 @@ pub(super) fn distances_with_envelope(
     let peaks = ascend(&hill, &Start { points, values, ..start });
     envelope.extend(peaks);
     let reverse = largest(&envelope.distances);
-    let hulls = Hulls::new(mesh);
-    let side = SweptSurface { union, hulls: &hulls };
-    let triangles = (0..surface.faces.len()).map(|face| surface.triangle(face)).collect();
     let on_mesh = OnMesh { mesh: bvh, value: sigma_at };
-    let peaks = peaks_above(&side, triangles, (&on_mesh, &start), epsilon_union.max(reverse));
-    let epsilon_union = peaks.iter().fold(epsilon_union, |most, peak| most.max(peak.distance));
-    let side = SweptUnion::new(pose, (surface, bvh), mesh, (union, &hulls));
     let known = epsilon_union.max(reverse);
-    envelope.extend(peaks_above(&side, side.pieces(), (&hill, &start), known));
+    let [forward, backward] =
+        swept((surface, bvh), (mesh, union), (&on_mesh, &hill), &start, known);
+    let epsilon_union = forward.iter().fold(epsilon_union, |most, peak| most.max(peak.distance));
+    envelope.extend(backward);
     let reverse = largest(&envelope.distances);
     let uniform = Summary::new(&sigma[..samples.uniform]);
     let distances = Distances {

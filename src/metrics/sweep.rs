@@ -47,8 +47,26 @@ const MOST_PIECES: usize = 1 << 18;
 const SEEDS: usize = 6;
 const NARROW: f64 = 0.25;
 
+/// The peaks of both surfaces that are farther from the other one than `known`, from the surface first.
+pub(super) fn swept(
+    surface: (&TriMesh, &TriangleBvh),
+    (mesh, union): (&MedialMesh, &MedialUnion),
+    (on_mesh, on_union): (&impl Hill, &impl Hill),
+    start: &Start<'_>,
+    known: f64,
+) -> [Vec<Peak>; 2] {
+    let hulls = Hulls::new(mesh);
+    let side = SweptSurface { union, hulls: &hulls };
+    let triangles = (0..surface.0.faces.len()).map(|face| surface.0.triangle(face)).collect();
+    let forward = peaks_above(&side, triangles, (on_mesh, start), known);
+    let known = forward.iter().fold(known, |most, peak| most.max(peak.distance));
+    let side = SweptUnion::new(start.pose, surface, mesh, (union, &hulls));
+    let reverse = peaks_above(&side, side.pieces(), (on_union, start), known);
+    [forward, reverse]
+}
+
 /// A surface to be swept.
-pub(super) trait Swept: Sync {
+trait Swept: Sync {
     /// A part of the surface.
     type Piece: Clone + Send + Sync;
 
@@ -61,7 +79,7 @@ pub(super) trait Swept: Sync {
 
 /// A piece that may exceed the largest distance.
 #[derive(Clone, Copy)]
-pub(super) struct Bound {
+struct Bound {
     centre: Vec3,
     /// The distance at the centre, 0 if that is not on the surface.
     reached: f64,
@@ -71,7 +89,7 @@ pub(super) struct Bound {
 /// The peaks of one surface that are farther from the other one than `known`, at most [`SEEDS`]. Samples
 /// gave `start`, which also limits the number of pieces. The result is the same for any number of
 /// threads.
-pub(super) fn peaks_above<S: Swept>(
+fn peaks_above<S: Swept>(
     side: &S,
     mut pieces: Vec<S::Piece>,
     (hill, start): (&impl Hill, &Start<'_>),
@@ -116,7 +134,7 @@ fn rise(gradient: Vec3, from: Vec3, corners: &[Vec3]) -> f64 {
 }
 
 /// The triangles of a surface, with `|sigma|`.
-pub(super) struct SweptSurface<'a> {
+struct SweptSurface<'a> {
     pub union: &'a MedialUnion,
     pub hulls: &'a Hulls,
 }
@@ -143,7 +161,7 @@ impl Swept for SweptSurface<'_> {
 }
 
 /// The surfaces of all primitives, with distances from a surface.
-pub(super) struct SweptUnion<'a> {
+struct SweptUnion<'a> {
     side: UnionSide<'a>,
     union: &'a MedialUnion,
     hulls: &'a Hulls,
