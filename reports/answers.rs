@@ -318,6 +318,8 @@ fn row_of(
     let known = criterion.values[first].iter().flatten();
     let met = known.clone().filter(|found| found.value.is_finite());
     let seconds = middle(met.clone().map(|found| found.seconds));
+    // A row of the most meshes is not ranked by values.
+    let is_by_value = !title.ends_with(MOST_MESHES);
     let mut cells = vec![
         Cell::from(title),
         Cell { best: true, ..Cell::from(comparison.series[first].as_str()) },
@@ -327,8 +329,6 @@ fn row_of(
     ];
     let runner_up = ranks.get(1).map(|rank| rank.series);
     let pair = runner_up.and_then(|second| pairs.between(first, second));
-    // A row of the most meshes is not ranked by values.
-    let is_by_value = !title.ends_with(MOST_MESHES);
     let pair = pair.filter(|_| is_by_value);
     let ratio = pair.as_ref().and_then(|pair| {
         let ratio = pair.ratio_text()?;
