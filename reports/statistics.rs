@@ -4,7 +4,7 @@
 //! counts as infinite, so it is among the largest differences; meshes where both have none, or equal values, have no sign.
 //!
 //! 1. Wilcoxon, 1945, "Individual comparisons by ranking methods": the signed-rank test, two-sided. The distribution of the
-//!    rank sum is exact, also for ties; above [`MOST_EXACT`] differences it is the normal one with Pratt's tie correction.
+//!    rank sum is exact, also for ties; above [`MOST_EXACT`] differences it is the normal one, corrected for ties.
 //! 2. Holm, 1979, "A simple sequentially rejective multiple test procedure": p-values for all pairs of methods.
 //! 3. Efron, 1979, "Bootstrap methods": percentiles of the geometric mean over resampled meshes.
 //!

@@ -103,6 +103,7 @@ pub struct Tight {
 /// [`Level::Native`], a bound of the two-sided error, at two to three times that.
 pub fn method(starter: impl MedialSimplifier + 'static) -> Tight {
     let info = MethodInfo::new("tight", "Tight")
+        .seeded()
         .citation("This project; not published.")
         .summary(
             "Collapses and inserts spheres in the order of the two-sided error at samples, and moves all \
@@ -349,6 +350,7 @@ impl Within<'_> {
         let mut least = f64::INFINITY;
         // The state, and the count and measured error of it and of the largest count that missed the bound.
         let (mut within, mut held, mut missed) = (None, None, None::<(usize, f64)>);
+        let mut misses = 0;
         for trial in 1.. {
             let mut state = self.with(&meshes, wanted)?;
             let now = (state.mesh.spheres.len(), state.error);
@@ -360,10 +362,16 @@ impl Within<'_> {
                 if held.is_none_or(|(spheres, _)| now.0 < spheres) {
                     (within, held) = (Some(state), Some(now));
                 }
+                misses = 0;
             } else if missed.is_none_or(|(spheres, _)| spheres < now.0) {
                 missed = Some((now.0, now.1.max(state.error)));
+                misses += 1;
             }
             wanted = match (held, missed) {
+                // Errors that fall in a step, as of flat solids, mislead an interpolation.
+                (Some((many, _)), Some((few, _))) if misses > 1 => {
+                    ((few * many) as f64).sqrt().round() as usize
+                }
                 (Some(held), Some(missed)) => between(held, missed, CLOSE * aim),
                 (Some((spheres, error)), None) => {
                     (spheres as f64 * (error / aim).powf(RATE)) as usize
