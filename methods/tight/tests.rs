@@ -276,6 +276,18 @@ fn a_bound_is_held_by_the_judge_and_with_fewer_spheres_if_it_is_wider() {
     }
 }
 
+/// The error of a flat solid falls in a step from a few per cent to almost none, which no interpolation foretells.
+#[test]
+fn a_bound_of_a_flat_solid_takes_few_spheres() {
+    let shape = shape("bracket", 30);
+    let mut params = quick();
+    params.set("samples", "1000");
+    let tight = crate::find("tight").unwrap();
+    let mut levels = tight.prepare(&shape, &params, &RunContext::default()).unwrap();
+    let found = levels.at(Level::Native(0.01)).unwrap();
+    assert!(found.mesh.spheres.len() < 60, "{}", found.mesh.spheres.len());
+}
+
 #[test]
 fn a_ball_in_a_box_touches_its_nearest_sides() {
     let shape = shape("box", 4);

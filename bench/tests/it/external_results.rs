@@ -194,7 +194,7 @@ fn seeds_are_results_of_one_row() {
     done(&[&words[..], &["--counts-only", "--seeds", "3", "--out", &at("report")]].concat());
     let of = |method: &str| {
         let all =
-            records(&at("report")).into_iter().filter(move |r| r["simplify"]["method"] == method);
+            records(at("report")).into_iter().filter(move |r| r["simplify"]["method"] == method);
         all.map(|record| record["simplify"]["seed"].as_u64().expect("a seed")).collect::<Vec<_>>()
     };
     assert_eq!(of("coverage-axis"), [0, 1, 2, 0, 1, 2]);

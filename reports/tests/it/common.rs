@@ -194,6 +194,7 @@ pub fn header(methods: &[&str]) -> Header {
         home: format!("Few spheres; {id} is made up."),
         published: "a count of 1,000 spheres".to_owned(),
         native: Some("theta (degrees)".to_owned()),
+        params: vec![],
     };
     let run = RunNote {
         command: "medial compare --spheres 1000,500,200,100".to_owned(),
