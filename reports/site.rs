@@ -262,7 +262,7 @@ const HAND_IN: &str = "<ol>\n<li>Put one medial mesh for each mesh and number of
     written by <code>medial datasets make bracket -o bracket.off</code>. Any meshes and counts will do; the edition has 500, \
     200 and 100 spheres.</li>\n<li>Add <code>method.toml</code> with title, authors, \
     citation, bibtex, run, machine and, if you like, seconds.</li>\n<li>Check it as we do, and look at the page:\n\
-    <pre class=\"command\"><code>medial compare --dataset builtin --given 'NAME=FOLDER' --methods qmat --counts-only --against \
-    2027.1</code></pre></li>\n<li>Open a pull request that adds the folder below <code>submissions/</code>.</li>\n</ol>\n\
+    <pre class=\"command\"><code>medial compare --dataset builtin --given 'NAME=FOLDER' --methods qmat --spheres 500,200,100 --counts-only \
+    --against 2027.1</code></pre></li>\n<li>Open a pull request that adds the folder below <code>submissions/</code>.</li>\n</ol>\n\
     <p>Only the medial meshes count: every number but the claimed seconds is measured again. \
     <a href=\"https://github.com/medial-rs/medial/blob/main/docs/submit.md\">More on handing in results</a></p>\n";

@@ -19,7 +19,7 @@ use medial::simplifier::{
 };
 use medial::surface::Side;
 use medial::{complex, surface};
-use medial_reports::{Target, check_regular, significant};
+use medial_reports::{COUNT_TOLERANCE, Target, check_regular, significant};
 use serde::{Deserialize, Serialize};
 
 use crate::plugin::{OwnSeconds, reach};
@@ -273,7 +273,7 @@ fn prepare<'s>(
         let spheres = mesh.spheres.len();
         match level {
             Level::Published => {}
-            Level::Spheres(count) if count == spheres => {}
+            Level::Spheres(count) if is_near(spheres, count) => {}
             _ => {
                 let why = format!("the file has only the level of {spheres} spheres");
                 return Err(SimplifyError::unsupported(why));
@@ -299,8 +299,13 @@ pub(crate) struct ExternalFile {
     params: ExternalParams,
     /// SHA-256 of its bytes.
     hash: String,
-    /// Number of spheres.
+    /// Requested number of spheres, which the result has to within 2 %.
     spheres: usize,
+}
+
+/// Whether a result counts as one with a requested number of spheres.
+fn is_near(spheres: usize, requested: usize) -> bool {
+    spheres.abs_diff(requested) as f64 <= COUNT_TOLERANCE * requested as f64
 }
 
 impl Study {
@@ -370,6 +375,9 @@ impl Study {
         }
         let Claims { title, authors, citation, bibtex, run, machine, seconds } = claims;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        // The count in the name, if it is as near as the results of methods must be.
+        let named = stem.rsplit_once('-').and_then(|(_, count)| count.parse().ok());
+        let spheres = named.filter(|&count| is_near(spheres, count)).unwrap_or(spheres);
         let claimed_seconds = seconds.get(&*stem).copied();
         let (file, same_as) = (path.to_string_lossy().into_owned().into(), String::new());
         let params = ExternalParams {

@@ -133,6 +133,22 @@ fn a_forged_folder_is_refused_or_measured() {
 }
 
 #[test]
+fn a_count_in_the_name_within_2_percent_is_the_requested_one() {
+    let at = folder();
+    fs::create_dir(at("theirs")).expect("a folder");
+    for (count, name) in [("99", "capsule-100"), ("50", "capsule-60")] {
+        let file = at(&format!("theirs/{name}.ma"));
+        done(&["simplify", "builtin:capsule", "-m", "qmat", "--spheres", count, "-o", &file]);
+    }
+    let theirs = compared_with(&at("theirs"), &at("report"));
+    let counts = theirs.iter().map(|record| {
+        let simplify = &record["simplify"];
+        [&simplify["level"]["spheres"], &simplify["spheres"]].map(|n| n.as_u64().expect("a count"))
+    });
+    assert_eq!(counts.collect::<Vec<_>>(), [[100, 99], [50, 50]]);
+}
+
+#[test]
 fn a_site_has_a_page_for_each_method_mesh_and_external_result() {
     let at = folder();
     fs::create_dir(at("theirs")).expect("a folder");
