@@ -126,8 +126,9 @@ impl Claims {
 
 /// Name of the file with [`Claims`].
 const CLAIMS: &str = "method.toml";
-/// Most bytes of it, and of a result; larger files are refused unread.
+/// Most bytes of it, of a result in its folder, and of one that is named by itself; larger files are refused unread.
 const LARGEST_CLAIMS: u64 = 100_000;
+const LARGEST_IN_FOLDER: u64 = 4_000_000;
 const LARGEST_RESULT: u64 = 200_000_000;
 /// Extensions of external results.
 const EXTENSIONS: [&str; 5] = ["ma", "ply", "off", "obj", "stl"];
@@ -177,6 +178,9 @@ impl ExternalResult {
             // A study may have both `box` and `box-8`: the longest name wins.
             let mesh = belonging.max_by_key(|mesh| mesh.len());
             if let Some(mesh) = mesh.filter(|_| EXTENSIONS.contains(&extension.as_str())) {
+                // Folders come from others: a single file must not take all memory.
+                check_size(&file, LARGEST_IN_FOLDER)
+                    .map_err(|why| format!("{}: {why} in a folder", file.display()))?;
                 files.push(Self { file, mesh: Some(mesh.clone()), ..self.clone() });
             }
         }
