@@ -2,7 +2,8 @@
 //!
 //! For each criterion the table names the best method. Its value belongs to that method alone: a median or mean over
 //! the meshes that it ran on, where a missing result counts as infinite. The ratio to the runner-up is over the
-//! meshes where both have a result. A further method changes a row only if it becomes first or second.
+//! meshes where both have a result. A further method changes these numbers only if it becomes first or second.
+//! Whether a difference is established also depends on the number of methods, for whose pairs the test is corrected.
 //!
 //! The best median and the most results may belong to different methods. Then both are named.
 

@@ -50,7 +50,7 @@ pub(crate) struct Paired {
 impl Paired {
     fn of(first: &Values, second: &Values) -> Self {
         let pairs = first.iter().zip(second).filter_map(|(a, b)| Some([(*a)?.value, (*b)?.value]));
-        // Where both have no result the mesh tells nothing. A perfect result is zero and has no logarithm.
+        // A mesh without a result of either is left out. A perfect result is zero, which has no logarithm.
         let pairs = pairs.filter(|[a, b]| a.is_finite() || b.is_finite());
         let differences: Vec<f64> = pairs
             .map(|[a, b]| if a == b { 0.0 } else { a.max(1e-9).ln() - b.max(1e-9).ln() })

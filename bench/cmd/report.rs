@@ -63,11 +63,10 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         freeze(dir, &records, edition, registry)?;
     }
     if let Some(site) = &arguments.site {
-        if site.join(AXES).exists() {
-            return Err(Failure::at(
-                site,
-                "a folder of results; write the site into a folder of its own",
-            ));
+        // Somebody else's index.html must not be replaced.
+        let is_empty = fs::read_dir(site).map_or(true, |mut files| files.next().is_none());
+        if !is_empty && !site.join("submissions.html").exists() {
+            return Err(Failure::at(site, "not empty and no earlier site (expected a new folder)"));
         }
         let header = read_header(dir).map_err(Failure::input)?;
         write_site(site, dir, &shown, &header).map_err(Failure::input)?;

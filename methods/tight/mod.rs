@@ -17,7 +17,7 @@
 //! 5. *Swap* (`start.rs`): spheres are inserted where the error is largest, and as many edges collapsed
 //!    where it hurts least. Only the spheres around them move then (`settle`).
 //! 6. *Rounds* (`rounds.rs`): steps of 3 at powers up to 32, between which the largest errors, found by
-//!    local ascent on both sides, join the samples, and balls are watched where the union came out of the solid;
+//!    local ascent and a sweep of both sides, join the samples, and balls are watched where the union came out of the solid;
 //!    then swaps as in 5, each with a second chance, and rounds again. The state
 //!    with the least measured error is the result.
 //!

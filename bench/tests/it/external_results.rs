@@ -191,7 +191,8 @@ fn a_site_has_a_page_for_each_method_mesh_and_external_result() {
     );
     let bibtex = fs::read_to_string(at("report/tables/methods.bib")).expect("a file");
     assert!(bibtex.contains("@misc{them") && bibtex.contains("medial"), "{bibtex}");
-    // A store is no place for a site.
+    // Again into the same folder, but not over files of somebody else, such as a store.
+    done(&["report", &at("report"), "--site", &at("site")]);
     assert_eq!(run(&["report", &at("report"), "--site", &at("report")]).0, 1);
 }
 
