@@ -20,12 +20,12 @@ use super::collapse::Part;
 use crate::Result;
 
 /// Samples of the surface, below 500 spheres and from there on.
-const SAMPLES: [usize; 2] = [10_000, 12_000];
+const SAMPLES: [usize; 2] = [6_000, 12_000];
 
 /// Samples along sharp edges, a share of those. With a quarter, a face grew across a hole of `abc_bracket`.
 const SHARE_OF_EDGES: f64 = 0.1;
 
-/// Samples of the surface from which the largest errors are searched, and three times as many of the union. More gave
+/// Samples of the surface from which the largest errors are searched, and twice as many of the union. More gave
 /// the same errors at 100 spheres.
 const SEARCHED: usize = 8_000;
 
@@ -42,8 +42,8 @@ pub(super) const ASIDE: f64 = 0.3;
 const SHARP: f64 = 0.866;
 const CLOSEST: f64 = 1e-3;
 
-/// Interior points that are residuals from the start.
-const INTERIOR: usize = 4_000;
+/// Interior points that are residuals from the start, below 500 spheres and from there on.
+const INTERIOR: [usize; 2] = [2_500, 4_000];
 
 /// Interior points among which uncovered ones are looked for.
 const POOL: usize = 20_000;
@@ -143,7 +143,8 @@ impl Goal {
     /// The points that residuals are made for, when `spheres` are left.
     pub fn points(&self, spheres: usize) -> Points {
         let Self { surface, pool, seed, .. } = self;
-        let count = if spheres < 500 { SAMPLES[0] } else { SAMPLES[1] };
+        let many = usize::from(spheres >= 500);
+        let count = SAMPLES[many];
         let spread = sample(surface, &Sampling::BlueNoise { count, seed: seed ^ STREAM });
         let mut used = vec![false; surface.vertices.len()];
         surface.faces.iter().flatten().for_each(|&v| used[v as usize] = true);
@@ -154,7 +155,7 @@ impl Goal {
         let vertices = vertices.into_iter().step_by(every.max(1));
         let vertices = vertices.map(|point| Sample { point, weight: ASIDE });
         let samples = spread.into_iter().map(|point| Sample { point, weight: 1.0 });
-        let stride = (pool.len() / INTERIOR).max(1);
+        let stride = (pool.len() / INTERIOR[many]).max(1);
         let interior = pool.iter().step_by(stride).copied().collect();
         let along = self.along_sharp_edges(SHARE_OF_EDGES * count as f64);
         let along = along.into_iter().map(|point| Sample { point, weight: ASIDE });
@@ -171,7 +172,7 @@ impl Goal {
     /// When the surface has no area.
     pub fn peaks(&self) -> Result<PeakSearch<'_>, MetricError> {
         let seed = self.seed ^ STREAM;
-        let envelope_samples = 3 * SEARCHED;
+        let envelope_samples = 2 * SEARCHED;
         let options = DistanceOptions { surface_samples: SEARCHED, envelope_samples, seed };
         PeakSearch::new(&self.surface, &self.tree, options)
     }

@@ -63,7 +63,7 @@ use medial::simplifier::{
     Diagnostics, Level, MedialSimplifier, MethodInfo, NativeLevel, ParamFields, Params, RunContext,
     Simplification, Simplified, SimplifyError,
 };
-use rounds::{Descent, Objective, Polish, State};
+use rounds::{Descent, Objective, Polish, State, Witnesses};
 use start::Start;
 
 use crate::levels::{checked, level_within, some_spheres, within};
@@ -176,6 +176,7 @@ impl PreparedTight {
         let is_polish = start.spheres.len() <= count;
         diagnostics.count("crossing_faces_of_the_start", crossing_faces(&start).len());
         let mut descent = Descent::new(goal, goal.points(count), start)?;
+        let mut witnesses = Witnesses::new(goal)?;
         if is_polish {
             if descent.mesh.spheres.len() < count {
                 let spheres = descent.mesh.spheres.len();
@@ -183,7 +184,7 @@ impl PreparedTight {
                     .warn(format!("{spheres} spheres instead of {count}: the start has no more"));
             }
         } else {
-            descent = reduced(descent, count, run)?;
+            descent = reduced(descent, count, &mut witnesses, run)?;
             let reached = descent.mesh.spheres.len();
             if reached > count {
                 diagnostics.warn(format!(
@@ -191,9 +192,10 @@ impl PreparedTight {
                      homotopy type and folds no face"
                 ));
             }
-            descent = swapped_often(descent, run)?;
+            descent = swapped_often(descent, &mut witnesses, run)?;
         }
-        let state = Polish { goal, params, run, swaps: !is_polish }.run(descent, diagnostics)?;
+        let polish = Polish { goal, params, run, swaps: !is_polish };
+        let state = polish.run(descent, witnesses, diagnostics)?;
         Ok(state.mesh)
     }
 }
@@ -210,8 +212,14 @@ fn bounded(spheres: usize) -> Result<()> {
     )))
 }
 
-/// Step 4: passes of collapses until `count` spheres are left, or no collapse is possible.
-fn reduced<'a>(mut descent: Descent<'a>, count: usize, run: &RunContext) -> Result<Descent<'a>> {
+/// Step 4: passes of collapses until `count` spheres are left, or no collapse is possible. After the last ones the
+/// places of the largest errors join: a face can slip across a hole between the samples.
+fn reduced<'a>(
+    mut descent: Descent<'a>,
+    count: usize,
+    witnesses: &mut Witnesses<'a>,
+    run: &RunContext,
+) -> Result<Descent<'a>> {
     descent.run(Objective::power(POWER, descent.largest()), STEPS[1], run)?;
     while descent.mesh.spheres.len() > count {
         let spheres = descent.mesh.spheres.len();
@@ -220,6 +228,9 @@ fn reduced<'a>(mut descent: Descent<'a>, count: usize, run: &RunContext) -> Resu
         let target = least.max((spheres as f64 * LEFT[near]) as usize);
         let Some(smaller) = passed(&descent, target, near, run)? else { break };
         descent = smaller;
+        if near == 1 {
+            witnesses.measure(&mut descent, 0.0)?;
+        }
     }
     Ok(descent)
 }
@@ -238,14 +249,21 @@ fn passed<'a>(
 }
 
 /// Step 5, while it lowers the sum of the eighth powers.
-fn swapped_often<'a>(mut descent: Descent<'a>, run: &RunContext) -> Result<Descent<'a>> {
+fn swapped_often<'a>(
+    mut descent: Descent<'a>,
+    witnesses: &mut Witnesses<'a>,
+    run: &RunContext,
+) -> Result<Descent<'a>> {
     let mut each = (descent.mesh.spheres.len() / 12).max(2);
     descent.run(Objective::power(POWER, descent.largest()), STEPS[1], run)?;
     let judge = Objective::power(8, descent.largest());
     for _ in 0..SWAPS {
         let trial = start::swapped(&descent, each, 0, run)?;
         match trial.filter(|trial| trial.value(&judge) < descent.value(&judge)) {
-            Some(trial) => descent = trial,
+            Some(trial) => {
+                descent = trial;
+                witnesses.measure(&mut descent, 0.0)?;
+            }
             None if each > 1 => each /= 2,
             None => break,
         }
@@ -438,8 +456,11 @@ impl Within<'_> {
         let enough = meshes.iter().rev().find(|(mesh, _)| mesh.spheres.len() >= count);
         let (mesh, _) = enough.unwrap_or(&meshes[0]);
         let descent = Descent::new(goal, goal.points(count), mesh.clone())?;
-        let descent = swapped_often(reduced(descent, count, run)?, run)?;
-        Polish { goal, params, run, swaps: true }.run(descent, &mut Diagnostics::default())
+        let mut witnesses = Witnesses::new(goal)?;
+        let descent = reduced(descent, count, &mut witnesses, run)?;
+        let descent = swapped_often(descent, &mut witnesses, run)?;
+        let polish = Polish { goal, params, run, swaps: true };
+        polish.run(descent, witnesses, &mut Diagnostics::default())
     }
 }
 

@@ -43,8 +43,9 @@ const WITNESS: f64 = 0.6;
 /// Most witnesses that a round takes of each kind, the largest errors first.
 const WITNESSES: usize = 300;
 
-/// Of witnesses in a cube of this side one is enough: the errors of the others are hardly different.
-const APART: f64 = 0.001;
+/// Of witnesses in a cube of this side one is enough, on the surface, on the union's boundary, and inside: the errors
+/// of the others are hardly different. On the boundary, each one outside means a ball that is watched from then on.
+const APART: [f64; 3] = [0.001, 0.002, 0.001];
 
 /// A round that lowers the error by a smaller share did not help.
 const GAIN: f64 = 0.01;
@@ -56,7 +57,7 @@ const WORSE: f64 = 1.15;
 /// Rounds without a gain that end the rounds.
 const PATIENCE: usize = 2;
 
-/// Most swaps that are tried, and swaps without a gain, one after the other, that end the search.
+/// Most swaps that are tried, and swaps of one sphere without a gain, one after the other, that end the search.
 const SWAPS: usize = 24;
 const FAILURES: usize = 6;
 
@@ -99,11 +100,15 @@ impl<'a> Polish<'a> {
     ///
     /// # Errors
     /// When the run is cancelled, or the mesh cannot be measured.
-    pub fn run(&self, mut descent: Descent<'a>, diagnostics: &mut Diagnostics) -> Result<State> {
+    pub fn run(
+        &self,
+        mut descent: Descent<'a>,
+        mut witnesses: Witnesses<'a>,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<State> {
         for (power, steps) in WARM {
             descent.run(Objective::power(power, descent.largest()), steps, self.run)?;
         }
-        let mut witnesses = Witnesses::new(self.goal)?;
         let error = witnesses.measure(&mut descent, f64::INFINITY)?;
         let (mut best, points) = self.rounds(descent, error, &mut witnesses)?;
         if self.swaps {
@@ -178,7 +183,11 @@ impl<'a> Polish<'a> {
                     from = trial;
                 }
             }
-            idle = if error < (1.0 - GAIN) * best.error { 0 } else { idle + 1 };
+            if error < (1.0 - GAIN) * best.error {
+                idle = 0;
+            } else if each == 1 {
+                idle += 1;
+            }
             if error < best.error {
                 *best = State { mesh: from.mesh.clone(), error };
             }
@@ -233,22 +242,27 @@ impl<'a> Polish<'a> {
 }
 
 /// The search for the places of the largest errors.
-struct Witnesses<'a> {
+pub(super) struct Witnesses<'a> {
     goal: &'a Goal,
     search: PeakSearch<'a>,
-    /// Cubes of side [`APART`] that have a witness of a kind.
+    /// Cubes of the sides [`APART`] that have a witness of a kind.
     seen: HashSet<(u8, [i64; 3])>,
 }
 
 impl<'a> Witnesses<'a> {
-    fn new(goal: &'a Goal) -> Result<Self> {
+    /// # Errors
+    /// When the surface has no area.
+    pub fn new(goal: &'a Goal) -> Result<Self> {
         let search = goal.peaks().map_err(refused)?;
         Ok(Self { goal, search, seen: HashSet::new() })
     }
 
     /// The error of a mesh, both ways. Where it is large, samples join. Both surfaces are swept unless an ascent finds
     /// an error of `swept_below`.
-    fn measure(&mut self, descent: &mut Descent<'_>, swept_below: f64) -> Result<f64> {
+    ///
+    /// # Errors
+    /// When the mesh has no union.
+    pub fn measure(&mut self, descent: &mut Descent<'_>, swept_below: f64) -> Result<f64> {
         let Self { goal, search, .. } = self;
         let deep = descent.points.deep;
         let peaks = search.of(&descent.mesh, swept_below).map_err(refused)?;
@@ -289,7 +303,7 @@ impl<'a> Witnesses<'a> {
     /// The first witnesses of a kind, of each cube one.
     fn new_ones(&mut self, kind: u8, points: Vec<Vec3>) -> Vec<Vec3> {
         let new = points.into_iter().filter(|&point| {
-            let cube = (point / APART).floor().to_array().map(|x| x as i64);
+            let cube = (point / APART[usize::from(kind)]).floor().to_array().map(|x| x as i64);
             self.seen.insert((kind, cube))
         });
         new.take(WITNESSES).collect()
@@ -411,6 +425,8 @@ pub(super) struct Descent<'a> {
     pub guard: Guard,
     pattern: Pattern,
     damping: f64,
+    /// Balls that protrude by less have no residual.
+    tolerance: f64,
 }
 
 impl<'a> Descent<'a> {
@@ -434,7 +450,7 @@ impl<'a> Descent<'a> {
         clamp(&mut mesh, goal);
         let nearest = goal::nearest(&mesh, &points, &[])?;
         let held = places(&mesh, share, |_| true);
-        Self::of_parts(goal, points, mesh, nearest, held, rest)
+        Self::of_parts(goal, points, mesh, nearest, (held, 0.0), rest)
     }
 
     /// The descent of an edited mesh, with the same points; `of` has for each sphere its number in this one.
@@ -454,6 +470,7 @@ impl<'a> Descent<'a> {
             let primitive = kept.of(held.primitive)?;
             Some(Held { primitive, ..*held })
         }));
+        let watched = (watched, self.tolerance);
         Self::of_parts(goal, points.clone(), mesh, nearest, watched, Rest::default())
     }
 
@@ -462,14 +479,14 @@ impl<'a> Descent<'a> {
         points: Points,
         mesh: MedialMesh,
         nearest: Vec<NearestPrimitive>,
-        mut held: Vec<Held>,
+        (mut held, tolerance): (Vec<Held>, f64),
         rest: Rest,
     ) -> Result<Self> {
         let Rest { mut fixed, limits, still } = rest;
         fixed.resize(mesh.spheres.len(), false);
         let spread = held.len();
         held.extend(nearest_balls(&mesh, &points.outside)?);
-        let residuals = residuals(&mesh, goal, &points, &limits, nearest, 0.0, &mut held);
+        let residuals = residuals(&mesh, goal, &points, &limits, nearest, tolerance, &mut held);
         let pattern = Pattern::new(mesh.spheres.len(), &mesh.edges);
         let guard = Guard::new(&mesh, still);
         let damping = FIRST_DAMPING;
@@ -485,6 +502,7 @@ impl<'a> Descent<'a> {
             guard,
             pattern,
             damping,
+            tolerance,
         })
     }
 
@@ -498,8 +516,8 @@ impl<'a> Descent<'a> {
             return Ok(());
         }
         let mut watched = nearest_balls(mesh, &more.outside)?;
-        let mut found =
-            residuals(mesh, goal, &more, &[], goal::nearest(mesh, &more, &[])?, 0.0, &mut watched);
+        let near = goal::nearest(mesh, &more, &[])?;
+        let mut found = residuals(mesh, goal, &more, &[], near, self.tolerance, &mut watched);
         held.extend(watched);
         rows.append(&mut found.rows);
         let of_interior = found.nearest.split_off(more.samples.len());
@@ -541,6 +559,12 @@ impl<'a> Descent<'a> {
     /// When the run is cancelled.
     pub fn run(&mut self, objective: Objective, steps: usize, run: &RunContext) -> Result<()> {
         let tolerance = objective.tolerance();
+        if tolerance < self.tolerance {
+            let Self { goal, points, mesh, limits, held, residuals: found, .. } = self;
+            let nearest = std::mem::take(&mut found.nearest);
+            *found = residuals(mesh, goal, points, limits, nearest, tolerance, held);
+        }
+        self.tolerance = tolerance;
         self.residuals.rows.retain(|row| objective.counts(row));
         let mut value = self.value(&objective);
         let (mut done, mut refused, mut growth) = (0, 0, 2.0);

@@ -41,6 +41,9 @@ const HALVINGS: usize = 10;
 /// Seeds are chosen among this many times as many samples: the largest are often all in one place.
 const CROWD: usize = 40;
 
+/// The sweep of a search leaves out distances that exceed the largest known one by a smaller share.
+const SHARE: f64 = 0.02;
+
 /// Smaller gains than this fraction of the diameter are rounding.
 const GAIN: f64 = 1e-10;
 
@@ -292,7 +295,7 @@ impl<'a> PeakSearch<'a> {
         let known = peaks.hausdorff();
         if known < swept_below {
             let [forward, reverse] =
-                swept((surface, tree), (&mesh, &union), (&on_mesh, &hill), &start, known);
+                swept((surface, tree), (&mesh, &union), (&on_mesh, &hill), &start, (known, SHARE));
             peaks.forward = sorted(forward, &[], &[]).into_iter().chain(peaks.forward).collect();
             peaks.reverse = sorted(reverse, &[], &[]).into_iter().chain(peaks.reverse).collect();
         }

@@ -29,7 +29,7 @@ use super::Distances;
 use super::ascent::{OnMesh, OnUnion, Peak, Start, ascend};
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::samples::{SEEDS, SurfaceSamples};
-use super::sweep::swept;
+use super::sweep::{FINAL_SHARE, swept};
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, UnionError};
 use crate::geometry::TriangulationError;
@@ -170,7 +170,7 @@ pub(super) fn distances_with_envelope(
     let on_mesh = OnMesh { mesh: bvh, value: sigma_at };
     let known = epsilon_union.max(reverse);
     let [forward, backward] =
-        swept((surface, bvh), (mesh, union), (&on_mesh, &hill), &start, known);
+        swept((surface, bvh), (mesh, union), (&on_mesh, &hill), &start, (known, FINAL_SHARE));
     let epsilon_union = forward.iter().fold(epsilon_union, |most, peak| most.max(peak.distance));
     envelope.extend(backward);
     let reverse = largest(&envelope.distances);

@@ -3,7 +3,7 @@
 //! Ascent ([`super::ascent`]) begins at samples. Where a union follows a surface closely, its peaks are
 //! narrower than the samples' spacing, and as high as each other: no ascent begins at most of them. The
 //! sweep divides both surfaces like the certificate ([`super::certificate`]) until no piece seems to
-//! exceed the largest distance by more than [`SHARE`]. It is faster, and proves nothing:
+//! exceed the largest distance by more than a share. It is faster, and proves nothing:
 //!
 //! 1. The change of a distance within a piece is estimated by its gradient at the centre.
 //! 2. A piece inherits the closest face and the deepest primitive of the piece that it is a part of.
@@ -26,8 +26,8 @@ use crate::Vec3;
 use crate::complex::{Incidence, MedialMesh, MedialUnion, Primitive};
 use crate::surface::{TriMesh, TriangleBvh};
 
-/// Pieces that exceed the largest known distance by a smaller share are not divided.
-const SHARE: f64 = 0.005;
+/// Pieces that exceed the largest known distance by a smaller share are not divided, for a final figure.
+pub(super) const FINAL_SHARE: f64 = 0.005;
 
 /// Nor are those that exceed it by less than this share of the diameter.
 const FLOOR: f64 = 1e-6;
@@ -47,21 +47,22 @@ const MOST_PIECES: usize = 1 << 18;
 const SEEDS: usize = 6;
 const NARROW: f64 = 0.25;
 
-/// The peaks of both surfaces that are farther from the other one than `known`, from the surface first.
+/// The peaks of both surfaces that are farther from the other one than `known` by more than a `share`, from the
+/// surface first.
 pub(super) fn swept(
     surface: (&TriMesh, &TriangleBvh),
     (mesh, union): (&MedialMesh, &MedialUnion),
     (on_mesh, on_union): (&impl Hill, &impl Hill),
     start: &Start<'_>,
-    known: f64,
+    (known, share): (f64, f64),
 ) -> [Vec<Peak>; 2] {
     let hulls = Hulls::new(mesh);
     let side = SweptSurface { union, hulls: &hulls };
     let triangles = (0..surface.0.faces.len()).map(|face| surface.0.triangle(face)).collect();
-    let forward = peaks_above(&side, triangles, (on_mesh, start), known);
+    let forward = peaks_above(&side, triangles, (on_mesh, start), (known, share));
     let known = forward.iter().fold(known, |most, peak| most.max(peak.distance));
     let side = SweptUnion::new(start.pose, surface, mesh, (union, &hulls));
-    let reverse = peaks_above(&side, side.pieces(), (on_union, start), known);
+    let reverse = peaks_above(&side, side.pieces(), (on_union, start), (known, share));
     [forward, reverse]
 }
 
@@ -93,11 +94,11 @@ fn peaks_above<S: Swept>(
     side: &S,
     mut pieces: Vec<S::Piece>,
     (hill, start): (&impl Hill, &Start<'_>),
-    known: f64,
+    (known, share): (f64, f64),
 ) -> Vec<Peak> {
     let mut left = (PIECES * start.points.len()).min(MOST_PIECES);
     let floor = FLOOR * start.pose.diameter();
-    let enough = |largest: f64| largest + f64::max(SHARE * largest, floor);
+    let enough = |largest: f64| largest + f64::max(share * largest, floor);
     let (mut largest, mut points, mut values) = (known, Vec::new(), Vec::new());
     while !pieces.is_empty() {
         left = left.saturating_sub(pieces.len());
