@@ -34,6 +34,14 @@ pub struct SheetOptions {
     pub length: f64,
 }
 
+impl SheetOptions {
+    /// The default for a mesh whose surface has this bounding-box diagonal.
+    pub fn of_diagonal(diagonal: f64) -> Self {
+        let Self { width, length } = Self::default();
+        Self { width: width * diagonal, length: length * diagonal }
+    }
+}
+
 impl Default for SheetOptions {
     /// For a mesh whose surface has a bounding-box diagonal of 1.
     fn default() -> Self {
@@ -141,6 +149,50 @@ impl SheetGraph {
         }
         graph.find_junctions(mesh, options.length);
         graph
+    }
+
+    /// The place of a sheet, or of a removed piece, in [`ColourMap::Parts`](crate::ColourMap): neighbours in the list of
+    /// sheets are far apart. Lines are at 1.
+    pub fn colour(sheet: Option<u32>) -> f64 {
+        // Multiples of the golden ratio spread evenly, however many there are.
+        let spread = |sheet: u32| (f64::from(sheet) * 0.618_033_988_749_894_9).fract();
+        7.0 / 8.0 * sheet.map_or(0.5, spread)
+    }
+
+    /// The mesh for a picture, and for each of its spheres a place in [`ColourMap::Parts`](crate::ColourMap). Each sheet has
+    /// spheres of its own, so that no colour runs into the next; seams and curves are edges without a face, junctions
+    /// isolated spheres.
+    ///
+    /// # Panics
+    /// If the mesh is another one than that of the graph.
+    pub fn painted(&self, mesh: &MedialMesh) -> (MedialMesh, Vec<f64>) {
+        // Removed pieces, lines and junctions have copies of their own, too.
+        const PIECES: u32 = u32::MAX - 2;
+        const LINES: u32 = u32::MAX - 1;
+        const JUNCTIONS: u32 = u32::MAX;
+        let part = |sheet: Option<u32>| sheet.unwrap_or(PIECES);
+        let faces = mesh.faces.iter().zip(&self.sheet_of_face);
+        let lines = || self.seams.iter().chain(&self.curves).flat_map(|chain| &chain.edges);
+        let mut copies: Vec<(u32, u32)> = Vec::new();
+        for (face, &sheet) in faces.clone() {
+            copies.extend(face.map(|v| (part(sheet), v)));
+        }
+        copies.extend(lines().flatten().map(|&v| (LINES, v)));
+        copies.extend(self.junctions.iter().map(|&v| (JUNCTIONS, v)));
+        copies.sort_unstable();
+        copies.dedup();
+        let copy = |part: u32, v: u32| copies.partition_point(|&other| other < (part, v)) as u32;
+        let edges = lines().map(|edge| edge.map(|v| copy(LINES, v))).collect();
+        let faces = faces.map(|(face, &sheet)| face.map(|v| copy(part(sheet), v))).collect();
+        let spheres = copies.iter().map(|&(_, v)| mesh.spheres[v as usize]).collect();
+        let colours = copies.iter().map(|&(part, _)| match part {
+            LINES | JUNCTIONS => 1.0,
+            PIECES => Self::colour(None),
+            sheet => Self::colour(Some(sheet)),
+        });
+        let colours = colours.collect();
+        let painted = MedialMesh::from_simplices(spheres, edges, faces);
+        (painted.expect("copies of valid simplices"), colours)
     }
 
     fn number_sheets(&mut self, pieces: &mut Pieces<'_>) {
@@ -455,6 +507,15 @@ mod tests {
         let graph = graph(&mesh(&points, &edges, &[[0, 1, 2], [0, 2, 3]]));
         assert_eq!(sizes(&graph), [1, 0, 2, 3]);
         assert_eq!(graph.junctions, [2, 5]);
+    }
+
+    #[test]
+    fn a_painted_mesh_has_the_faces_and_the_seams_as_lines() {
+        let mesh = mesh(&THREE, &[], &[[0, 1, 2], [0, 2, 3], [0, 2, 4]]);
+        let (painted, colours) = graph(&mesh).painted(&mesh);
+        assert_eq!((painted.faces.len(), painted.lone_edges().len()), (3, 1));
+        assert_eq!((painted.spheres.len(), colours.len()), (11, 11));
+        assert_eq!(colours.iter().filter(|&&colour| colour == 1.0).count(), 2);
     }
 
     #[test]
