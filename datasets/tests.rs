@@ -5,7 +5,7 @@ use std::sync::Arc;
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, SheetGraph, SheetOptions, Sphere, betti};
 use medial::geometry::PowerCrust;
-use medial::metrics::{ContactType, StructureSurface, spikes, triangle_quality};
+use medial::metrics::{ContactType, JudgeOptions, StructureSurface, spikes, triangle_quality};
 use medial::shape::{Shape, ShapeOptions};
 use medial::surface::{
     self, InsideTest, Normalisation, Sampling, SurfaceReport, TriMesh, TriangleBvh, sample,
@@ -313,6 +313,29 @@ fn known_axes_have_their_sheets_seams_and_junctions() {
             let found = initial(&shape.mesh(shape.default_resolution));
             assert_eq!(sheet_graph(&found).1, parts, "{}", shape.id);
         }
+    }
+}
+
+/// The medial balls of surface points are on the known axis, which lies inside and reaches every sharp convex edge.
+#[test]
+fn known_axes_have_the_structure_that_their_surfaces_imply() {
+    for id in ["sphere", "ellipsoid", "box", "bracket", "rod", "torus", "fillet", "blind-hole"] {
+        let built_in = find(id).unwrap();
+        let mesh = built_in.mesh(2 * built_in.default_resolution);
+        let report = surface::validate(&mesh).unwrap();
+        let shape = Shape::new(built_in.id, &mesh, report, ShapeOptions::default()).unwrap();
+        let Some((axis, _)) = normalised_axis(&built_in, shape.normalisation()) else { continue };
+        let options = JudgeOptions { samples: 2_000, volume_depth: 0, seed: 0 };
+        let evaluation = shape.judge(None, options).unwrap().evaluate(&axis).unwrap();
+        let structure = evaluation.structure.unwrap();
+        let name = built_in.id;
+        let (completeness, central) = (structure.completeness, structure.centrality);
+        assert!(completeness.p95.unwrap() < 0.0025, "{name}: {completeness:?}");
+        assert!(completeness.found.unwrap() > 0.99, "{name}: {completeness:?}");
+        assert!(central.p95.is_none_or(|p95| p95 < 5e-4), "{name}: {central:?}");
+        let reached = structure.features.convex_reached;
+        assert!(reached.is_none_or(|reached| reached > 0.96), "{name}: {reached:?}");
+        assert!(structure.outside.deepest < 1e-3, "{name}: {:?}", structure.outside);
     }
 }
 

@@ -228,7 +228,7 @@ fn surface_facets(mesh: &TriMesh, place: impl Fn(u32, Vec3) -> f32 + Sync) -> Ve
         (smooth_normals(mesh, &flat, CREASE.to_radians().cos()), sharp_sides(mesh, &flat));
     (mesh.faces.par_iter().enumerate())
         .map(|(face, corners)| {
-            let normals = normals[face];
+            let normals = normals(face);
             let places = std::array::from_fn(|k| place(corners[k], normals[k]));
             let lines = sharp[face].map(u8::from);
             Facet { corners: mesh.triangle(face), normals, places, lines }

@@ -290,7 +290,7 @@ impl StructureSurface {
         let ball = |&p: &Vec3| {
             let on = tree.closest(p);
             let weights = weights(on.point, &corners[on.face as usize]);
-            let normals = normals[on.face as usize];
+            let normals = normals(on.face as usize);
             let normal = (0..3).map(|k| weights[k] * normals[k]).sum::<Vec3>().try_normalize()?;
             let ball = shrinking_ball(on.point, normal, 0.5, Touched::Mesh(&tree));
             let is_medial = ball.steps > 0 && ball.end != End::InFront;

@@ -2,8 +2,6 @@
 
 use std::collections::HashMap;
 
-use rayon::prelude::*;
-
 use super::TriMesh;
 use crate::Vec3;
 
@@ -43,18 +41,22 @@ pub fn sharp_edges(mesh: &TriMesh, flat: &[Vec3], smooth: f64) -> Vec<SharpEdge>
 /// taken as it is. The cost is quadratic in this number.
 const MOST_AROUND: usize = 64;
 
-/// Normals at the corners of every face that are smooth where the surface is: round parts look round, and edges of
-/// machine parts stay sharp. Cost linear in the surface's size.
+/// The normals at the corners of a face, for any face: smooth where the surface is, so that round parts look round and
+/// edges of machine parts stay sharp. Cost linear in the surface's size.
 ///
-/// A corner takes the mean of the faces around its vertex that are at most the angle of cosine `smooth` from its own face, weighted by the
-/// sine of their angle there over the lengths of its sides, which is exact on a sphere (N. Max, "Weights for computing
-/// vertex normals from facet normals", J. Graphics Tools 4 (1999)).
+/// A corner takes the mean of the faces around its vertex that are at most the angle of cosine `smooth` from its own
+/// face, weighted by the sine of their angle there over the lengths of its sides, which is exact on a sphere (N. Max,
+/// "Weights for computing vertex normals from facet normals", J. Graphics Tools 4 (1999)).
 ///
 /// `flat` holds the unit normal of every face.
 ///
 /// # Panics
 /// If a face names a vertex or a normal that does not exist.
-pub fn smooth_normals(mesh: &TriMesh, flat: &[Vec3], smooth: f64) -> Vec<[Vec3; 3]> {
+pub fn smooth_normals<'a>(
+    mesh: &'a TriMesh,
+    flat: &'a [Vec3],
+    smooth: f64,
+) -> impl Fn(usize) -> [Vec3; 3] + Sync + 'a {
     // The faces around each vertex, and which of their corners it is.
     let mut around: Vec<Vec<(usize, usize)>> = vec![vec![]; mesh.vertices.len()];
     for (face, corners) in mesh.faces.iter().enumerate() {
@@ -62,7 +64,7 @@ pub fn smooth_normals(mesh: &TriMesh, flat: &[Vec3], smooth: f64) -> Vec<[Vec3; 
             around[vertex as usize].push((face, corner));
         }
     }
-    let corner = |face: usize, vertex: u32| {
+    let corner = move |face: usize, vertex: u32| {
         let around = &around[vertex as usize];
         if around.len() > MOST_AROUND {
             return flat[face];
@@ -81,6 +83,5 @@ pub fn smooth_normals(mesh: &TriMesh, flat: &[Vec3], smooth: f64) -> Vec<[Vec3; 
             .sum();
         sum.normalize_or(flat[face])
     };
-    let faces = mesh.faces.par_iter().enumerate();
-    faces.map(|(face, corners)| corners.map(|vertex| corner(face, vertex))).collect()
+    move |face| mesh.faces[face].map(|vertex| corner(face, vertex))
 }
