@@ -306,7 +306,9 @@ fn known_axes_have_their_sheets_seams_and_junctions() {
     for shape in catalogue() {
         let normal = Normalisation::of(&shape.mesh(shape.default_resolution)).unwrap();
         let Some((axis, parts)) = normalised_axis(&shape, &normal) else { continue };
-        assert_eq!(sheet_graph(&axis).1, parts, "{}", shape.id);
+        let (graph, found) = sheet_graph(&axis);
+        assert_eq!(found, parts, "{}", shape.id);
+        assert!(graph.seams.iter().all(|seam| seam.sheets.len() == 3), "{}", shape.id);
         // The Voronoi medial mesh of the default surface, where its samples do not spoil it.
         let clean = ["sphere", "box", "rounded-box", "bracket", "rod", "hollow-sphere", "rib"];
         if clean.contains(&shape.id) {

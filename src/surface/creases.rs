@@ -22,7 +22,7 @@ pub struct SharpEdge {
 /// # Panics
 /// If a face names a vertex or a normal that does not exist.
 pub fn sharp_edges(mesh: &TriMesh, flat: &[Vec3], smooth: f64) -> Vec<SharpEdge> {
-    let mut first = HashMap::new();
+    let mut first = HashMap::with_capacity(2 * mesh.faces.len());
     let mut sharp = Vec::new();
     for (f, &[a, b, c]) in mesh.faces.iter().enumerate() {
         for ([a, b], apex) in [([a, b], c), ([b, c], a), ([c, a], b)] {
