@@ -24,6 +24,25 @@ pub struct KnownAxis {
     /// How far `mesh` may be from the true axis, in centres and in radii, both ways; in the
     /// shape's own unit. Zero where it is exact up to rounding: no curved sheet or curve.
     pub tolerance: f64,
+    /// Numbers of sheets, seams and junctions of the true axis.
+    pub parts: [usize; 3],
+}
+
+/// [`KnownAxis::parts`] of a shape.
+pub(crate) fn parts(id: &str) -> [usize; 3] {
+    match id {
+        "ellipsoid" | "hollow-sphere" => [1, 0, 0],
+        "box" | "rounded-box" | "plate" => [13, 12, 4],
+        "bracket" | "fillet" => [17, 17, 6],
+        "rib" => [21, 22, 8],
+        "wedge" => [9, 7, 2],
+        "holed-plate" => [15, 13, 4],
+        // A curve meets each cone at its tip.
+        "rod" | "frustum" => [2, 0, 2],
+        "blind-hole" => [5, 2, 0],
+        // Points and curves.
+        _ => [0, 0, 0],
+    }
 }
 
 /// Rings of a triangulated disc, and vertices that each has more than the one inside it.
@@ -39,7 +58,7 @@ fn known(
     tolerance: f64,
 ) -> KnownAxis {
     let mesh = MedialMesh::from_simplices(spheres, edges, faces).expect("a generated complex");
-    KnownAxis { mesh, tolerance }
+    KnownAxis { mesh, tolerance, parts: [0; 3] }
 }
 
 /// One point.

@@ -58,7 +58,7 @@ impl BuiltIn {
 
     /// The medial axis where it is known in closed form.
     pub fn axis(&self) -> Option<KnownAxis> {
-        self.known_axis.map(|axis| axis())
+        self.known_axis.map(|axis| KnownAxis { parts: axes::parts(self.id), ..axis() })
     }
 }
 

@@ -1,12 +1,15 @@
 //! Every shape against a separate analytic depth function: nothing shared with the generators.
 
+use std::sync::Arc;
+
 use medial::Vec3;
-use medial::complex::{MedialMesh, MedialUnion, Sphere, betti};
+use medial::complex::{MedialMesh, MedialUnion, SheetGraph, SheetOptions, Sphere, betti};
 use medial::geometry::PowerCrust;
-use medial::metrics::{spikes, triangle_quality};
+use medial::metrics::{ContactType, JudgeOptions, StructureSurface, spikes, triangle_quality};
 use medial::shape::{Shape, ShapeOptions};
 use medial::surface::{
-    self, Normalisation, Sampling, SurfaceReport, TriMesh, TriangleBvh, sample, validate,
+    self, InsideTest, Normalisation, Sampling, SurfaceReport, TriMesh, TriangleBvh, sample,
+    validate,
 };
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -284,6 +287,130 @@ fn the_spheres_of_a_known_axis_touch_the_surface_from_inside() {
                 shape.id
             );
         }
+    }
+}
+
+fn normalised_axis(shape: &BuiltIn, normal: &Normalisation) -> Option<(MedialMesh, [usize; 3])> {
+    let axis = shape.axis()?;
+    Some((axis.mesh.transformed(1.0 / normal.diagonal, |p| normal.forward(p)), axis.parts))
+}
+
+fn sheet_graph(mesh: &MedialMesh) -> (SheetGraph, [usize; 3]) {
+    let graph = SheetGraph::new(mesh, SheetOptions::default());
+    let parts = [graph.areas.len(), graph.seams.len(), graph.junctions.len()];
+    (graph, parts)
+}
+
+#[test]
+fn known_axes_have_their_sheets_seams_and_junctions() {
+    for shape in catalogue() {
+        let normal = Normalisation::of(&shape.mesh(shape.default_resolution)).unwrap();
+        let Some((axis, parts)) = normalised_axis(&shape, &normal) else { continue };
+        let (graph, found) = sheet_graph(&axis);
+        assert_eq!(found, parts, "{}", shape.id);
+        assert!(graph.seams.iter().all(|seam| seam.sheets.len() == 3), "{}", shape.id);
+        // The Voronoi medial mesh of the default surface, where its samples do not spoil it.
+        let clean = ["sphere", "box", "rounded-box", "bracket", "rod", "hollow-sphere", "rib"];
+        if clean.contains(&shape.id) {
+            let found = initial(&shape.mesh(shape.default_resolution));
+            assert_eq!(sheet_graph(&found).1, parts, "{}", shape.id);
+        }
+    }
+}
+
+/// The medial balls of surface points are on the known axis, which lies inside and reaches every sharp convex edge.
+#[test]
+fn known_axes_have_the_structure_that_their_surfaces_imply() {
+    for id in ["sphere", "ellipsoid", "box", "bracket", "rod", "torus", "fillet", "blind-hole"] {
+        let built_in = find(id).unwrap();
+        let mesh = built_in.mesh(2 * built_in.default_resolution);
+        let report = surface::validate(&mesh).unwrap();
+        let shape = Shape::new(built_in.id, &mesh, report, ShapeOptions::default()).unwrap();
+        let Some((axis, _)) = normalised_axis(&built_in, shape.normalisation()) else { continue };
+        let options = JudgeOptions { samples: 2_000, volume_depth: 0, seed: 0 };
+        let evaluation = shape.judge(None, options).unwrap().evaluate(&axis).unwrap();
+        let structure = evaluation.structure.unwrap();
+        let name = built_in.id;
+        let (completeness, central) = (structure.completeness, structure.centrality);
+        assert!(completeness.p95.unwrap() < 0.0025, "{name}: {completeness:?}");
+        assert!(completeness.found.unwrap() > 0.99, "{name}: {completeness:?}");
+        assert!(central.p95.is_none_or(|p95| p95 < 5e-4), "{name}: {central:?}");
+        let reached = structure.features.convex_reached;
+        assert!(reached.is_none_or(|reached| reached > 0.96), "{name}: {reached:?}");
+        assert!(structure.outside.deepest < 1e-3, "{name}: {:?}", structure.outside);
+    }
+}
+
+/// Away from a margin around seams and rims, where contacts merge.
+#[test]
+fn contacts_at_points_of_known_axes_are_those_of_their_parts() {
+    const MARGIN: f64 = 0.02;
+    let mut totals = [[0_usize; 2]; 3];
+    for shape in catalogue() {
+        let mesh = shape.mesh(2 * shape.default_resolution);
+        let normal = Normalisation::of(&mesh).unwrap();
+        let Some((axis, _)) = normalised_axis(&shape, &normal) else { continue };
+        let vertices = mesh.vertices.iter().map(|&p| normal.forward(p)).collect();
+        let mesh = TriMesh { vertices, ..mesh };
+        let tree = Arc::new(TriangleBvh::new(&mesh).unwrap());
+        let inside = Arc::new(InsideTest::new(&mesh));
+        let surface = StructureSurface::new(&mesh, Arc::clone(&tree), inside, &[]);
+        let (graph, _) = sheet_graph(&axis);
+        let seams = graph.seams.iter().flat_map(|seam| &seam.edges);
+        let seams: Vec<[Vec3; 2]> =
+            seams.map(|&edge| axis.spheres_of(edge).map(|s| s.centre)).collect();
+        let rims = graph.boundary.iter().map(|&edge| axis.spheres_of(edge).map(|s| s.centre));
+        let junctions: Vec<Vec3> =
+            graph.junctions.iter().map(|&v| axis.spheres[v as usize].centre).collect();
+        let segment = |[a, b]: [Vec3; 2]| [a, b, b];
+        let ends = rims.chain(junctions.iter().map(|&p| [p; 2]));
+        let ends: Vec<_> = ends.map(segment).collect();
+        let all: Vec<_> = ends.iter().copied().chain(seams.iter().map(|&s| segment(s))).collect();
+        let [ends, all] = [ends, all].map(|segments| TriangleBvh::from_triangles(&segments).ok());
+        let is_away = |near: &Option<TriangleBvh>, p: Vec3| {
+            near.as_ref().is_none_or(|near| !near.any_within(p, MARGIN))
+        };
+        let mut random = Pcg64::seed_from_u64(5);
+        let mut points: [Vec<Vec3>; 3] = Default::default();
+        let areas: Vec<f64> = axis
+            .faces
+            .iter()
+            .map(|&face| {
+                let [a, b, c] = axis.spheres_of(face).map(|s| s.centre);
+                (b - a).cross(c - a).length()
+            })
+            .collect();
+        let largest = areas.iter().copied().fold(0.0, f64::max);
+        let mut tries = 0;
+        while !areas.is_empty() && points[0].len() < 1_000 && tries < 300_000 {
+            tries += 1;
+            let face = random.random_range(0..areas.len());
+            if random.random::<f64>() * largest > areas[face] {
+                continue;
+            }
+            let [a, b, c] = axis.spheres_of(axis.faces[face]);
+            let (s, t): (f64, f64) = (random.random(), random.random());
+            // The root makes the density uniform.
+            let p = a.centre.lerp(b.centre.lerp(c.centre, t), s.sqrt());
+            points[0].extend(is_away(&all, p).then_some(p));
+        }
+        while !seams.is_empty() && points[1].len() < 1_000 {
+            let [a, b] = seams[random.random_range(0..seams.len())];
+            let p = a.lerp(b, random.random());
+            points[1].extend(is_away(&ends, p).then_some(p));
+        }
+        // Where a curve meets a cone, a junction has no four contacts.
+        let meets_curve = matches!(shape.id, "rod" | "frustum");
+        points[2] = if meets_curve { vec![] } else { junctions };
+        let expected = [ContactType::Sheet, ContactType::Seam, ContactType::Junction];
+        for k in 0..3 {
+            let right = points[k].iter().filter(|&&p| surface.contacts(p) == expected[k]).count();
+            totals[k][0] += right;
+            totals[k][1] += points[k].len();
+        }
+    }
+    for [right, all] in totals {
+        assert!(right as f64 >= 0.98 * all as f64 && all >= 38, "{totals:?}");
     }
 }
 

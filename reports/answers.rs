@@ -11,7 +11,7 @@ use std::cmp::Ordering;
 
 use crate::comparison::{Comparison, Entry, reached};
 use crate::header::Header;
-use crate::metric::{HAUSDORFF, MIN_ANGLE, TOTAL_SECONDS, median};
+use crate::metric::{CENTRALITY, COMPLETENESS, HAUSDORFF, MIN_ANGLE, TOTAL_SECONDS, median};
 use crate::record::{Record, Status, Target};
 use crate::statistics::{FEWEST, Pairs};
 use crate::summary::{Ratio, reference, topology};
@@ -20,6 +20,9 @@ use crate::text::{counted, grouped, significant};
 
 /// The table compares results at the requested count nearest to this one.
 const USUAL: f64 = 100.0;
+
+/// The structure of results is compared at the requested count nearest to this one.
+const DETAILED: f64 = 500.0;
 
 /// Error that the cost of a result is compared at, in % of the diagonal.
 const BOUND: f64 = 1.0;
@@ -66,6 +69,9 @@ pub(crate) fn purpose_table(
         for (name, meshes) in &header.groups {
             rows.extend(in_group(comparison, level, spheres, (name, meshes)));
         }
+    }
+    if let Some((level, spheres)) = level_nearest(comparison, DETAILED) {
+        rows.extend(closest_structure(comparison, level, spheres));
     }
     rows.extend(within_bound(comparison));
     let is_one = comparison.meshes.len() == 1;
@@ -119,6 +125,17 @@ fn at_count(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Ve
     rows.push(right_everywhere(comparison, level, &spheres));
     rows.extend(rows_of(comparison, &triangles));
     rows
+}
+
+/// The rows of the medial mesh nearest to the axis that the surface implies, both ways.
+fn closest_structure(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Vec<Cell>> {
+    let values = values(comparison, Some(level), |entry| {
+        HAUSDORFF.of(entry.record).filter(|&e| entry.comparable() && e <= RANKED)?;
+        Some(COMPLETENESS.of(entry.record)?.max(CENTRALITY.of(entry.record)?))
+    });
+    let title = format!("closest structure at {}", counted(spheres, "sphere", "spheres"));
+    let text = |value| format!("axis missed and off centre {} %", significant(value, 3));
+    rows_of(comparison, &Criterion { title, values, text, of: "its distance" })
 }
 
 /// The rows of the lowest error among the meshes of a group.
@@ -189,12 +206,16 @@ fn stored_numbers(record: &Record) -> Option<f64> {
 
 /// The requested number of spheres nearest to [`USUAL`], among those that any method reached.
 pub(crate) fn usual_level(comparison: &Comparison<'_>) -> Option<(usize, usize)> {
+    level_nearest(comparison, USUAL)
+}
+
+fn level_nearest(comparison: &Comparison<'_>, usual: f64) -> Option<(usize, usize)> {
     comparison
         .counts()
         .filter(|&(level, _)| comparison.entries.iter().any(|e| e.level == level && e.comparable()))
         // By ratio: 50 and 200 are equally far from 100. Of two the larger one, which comes first.
         .min_by(|a, b| {
-            let [a, b] = [a, b].map(|count| (count.1.max(1) as f64 / USUAL).ln().abs());
+            let [a, b] = [a, b].map(|count| (count.1.max(1) as f64 / usual).ln().abs());
             a.total_cmp(&b)
         })
 }

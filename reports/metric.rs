@@ -202,6 +202,12 @@ impl Metric {
         self
     }
 
+    /// More is better.
+    const fn higher(mut self) -> Self {
+        self.better = Better::Higher;
+        self
+    }
+
     const fn at(mut self, path: &'static str) -> Self {
         self.path = path;
         self
@@ -295,6 +301,59 @@ pub(crate) const SPIKES: Metric = count("spikes", "spikes", |e| {
          the CSV holds the other thresholds and measures.",
 );
 
+// The structure of a result: a table and a plot of their own.
+pub(crate) const SHEETS_MATCHED: Metric =
+    share("sheets_matched", "sheets matched", "% of the true area", |e| {
+        Some(1.0 - e.structure.as_ref()?.known.as_ref()?.missing_share?)
+    })
+    .higher();
+
+pub(crate) const CONTACTS_RIGHT: Metric =
+    share("contacts_right", "contacts right", "% of samples", |e| {
+        e.structure.as_ref()?.contacts.right()
+    })
+    .higher();
+
+pub(crate) const SEAMS_RIGHT: Metric = share("seams_right", "seams right", "% of samples", |e| {
+    e.structure.as_ref()?.contacts.seams_right()
+})
+.higher();
+
+pub(crate) const FEATURES_REACHED: Metric =
+    share("features_reached", "sharp edges reached", "% of length", |e| {
+        e.structure.as_ref()?.features.convex_reached
+    })
+    .higher();
+
+pub(crate) const COMPLETENESS: Metric = length("completeness_p95", "axis missed, p95", |e| {
+    e.structure.as_ref()?.completeness.p95
+})
+.defined(
+    "95th percentile of the distances from the medial balls of surface points to the medial mesh: \
+     an error without a known axis.",
+);
+
+pub(crate) const CENTRALITY: Metric =
+    length("centrality_p95", "off centre, p95", |e| e.structure.as_ref()?.centrality.p95);
+
+pub(crate) const OUTSIDE_AREA: Metric =
+    share("outside_area", "outside the solid", "% of the sheets' area", |e| {
+        let structure = e.structure.as_ref()?;
+        let area = structure.graph.sheet_area + structure.graph.small_area;
+        (area > 0.0).then(|| structure.outside.area / area)
+    });
+
+/// The columns of the table of structure.
+pub(crate) const STRUCTURE: [&Metric; 7] = [
+    &SHEETS_MATCHED,
+    &CONTACTS_RIGHT,
+    &SEAMS_RIGHT,
+    &FEATURES_REACHED,
+    &COMPLETENESS,
+    &CENTRALITY,
+    &OUTSIDE_AREA,
+];
+
 pub(crate) const TOTAL_SECONDS: Metric = Metric::new(
     "seconds_total",
     "time",
@@ -381,6 +440,13 @@ pub const METRICS: &[Metric] = &[
     length("axis_true_to_computed_mean", "from the true axis, mean", |e| {
         Some(e.axis.as_ref()?.in_space.true_to_computed_mean)
     }),
+    SHEETS_MATCHED,
+    CONTACTS_RIGHT,
+    SEAMS_RIGHT,
+    FEATURES_REACHED,
+    COMPLETENESS,
+    CENTRALITY,
+    OUTSIDE_AREA,
     count("samples", "samples of the surface", |e| Some(e.distances.samples as f64)).neutral(),
     count("reverse_samples", "samples of the union", |e| Some(e.distances.reverse_samples as f64))
         .neutral(),

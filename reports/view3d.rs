@@ -8,9 +8,9 @@
 //! | 4 | length of the head, little-endian as all that follows |
 //! | head | JSON, the meaning of the arrays; filled up with spaces to a multiple of four |
 //! | `u32` | faces of the surface, three vertices each, as differences from the number before |
-//! | for each result | spheres, four `f32` each; edges, two `u32` each; faces, three `u32` each |
+//! | for each result | spheres, four `f32` each; edges, two `u32` each; faces, three `u32` each; seams, two `u32` for each edge; junctions, one `u32` each |
 //! | `u16` | vertices of the surface, in steps from the lowest corner |
-//! | for each result | one byte for each vertex: its signed error, 128 for none |
+//! | for each result | one byte for each vertex: its signed error, 128 for none; one byte for each face: the colour of its sheet |
 //!
 //! Coarse surfaces are refined without changing their shape, because errors belong to vertices; very
 //! fine ones are coarsened.
@@ -18,7 +18,7 @@
 use std::collections::HashMap;
 
 use medial::Vec3;
-use medial::complex::{MedialMesh, MedialUnion};
+use medial::complex::{MedialMesh, MedialUnion, SheetGraph, SheetOptions};
 use medial::surface::TriMesh;
 use serde_json::json;
 
@@ -43,6 +43,7 @@ pub struct View3d<'a> {
     surface: TriMesh,
     results: Vec<(String, &'a MedialMesh)>,
     errors: Vec<Vec<f64>>,
+    graphs: Vec<SheetGraph>,
 }
 
 impl<'a> View3d<'a> {
@@ -57,13 +58,17 @@ impl<'a> View3d<'a> {
             _ => coarsened(surface),
         };
         let mut errors = vec![];
+        let (low, high) = surface.bounding_box().unwrap_or_default();
+        let sizes = SheetOptions::of_diagonal(low.distance(high));
+        let mut graphs = vec![];
         for (label, axis) in &results {
             let union = MedialUnion::new(axis).map_err(|error| format!("{label}: {error}"))?;
+            graphs.push(SheetGraph::new(axis, sizes));
             // The union's distances are positive outside of it: a vertex inside is one that it reaches beyond.
             let signed = union.signed_batch(&surface.vertices);
             errors.push(signed.into_iter().map(|signed| -signed).collect());
         }
-        Ok(Self { camera, surface, results, errors })
+        Ok(Self { camera, surface, results, errors, graphs })
     }
 
     /// For each result how far its union reaches beyond the surface, at the vertices; negative where it falls
@@ -91,11 +96,15 @@ impl<'a> View3d<'a> {
         let step = (high - low).max_element() / f64::from(u16::MAX);
         let end = Errors::common_scale(&self.errors().iter().collect::<Vec<_>>(), diagonal);
         let radii = Scale::radii(self.results.iter().map(|(_, axis)| *axis));
-        let colours = [ColourMap::Viridis, ColourMap::Diverging].map(|map| {
+        let maps = [ColourMap::Viridis, ColourMap::Diverging, ColourMap::Parts];
+        let colours = maps.map(|map| {
             (0..COLOURS).map(|k| map.at(k as f64 / (COLOURS - 1) as f64)).collect::<Vec<_>>()
         });
-        let results = self.results.iter().map(|(label, axis)| {
-            json!({"label": label, "counts": [axis.spheres.len(), axis.edges.len(), axis.faces.len()]})
+        let results = self.results.iter().zip(&self.graphs).map(|((label, axis), graph)| {
+            let counts = [axis.spheres.len(), axis.edges.len(), axis.faces.len()];
+            let seams = seams(graph).count();
+            let sizes = [graph.areas.len(), graph.seams.len(), graph.junctions.len()];
+            json!({"label": label, "counts": counts, "seams": seams, "structure": sizes})
         });
         let head = json!({
             "direction": camera.direction.to_array(),
@@ -116,8 +125,10 @@ impl<'a> View3d<'a> {
         let mut bytes = (head.len() as u32).to_le_bytes().to_vec();
         bytes.append(&mut head);
         self.arrays(surface, (low, step), &mut bytes);
-        for values in errors {
+        for (values, graph) in errors.iter().zip(&self.graphs) {
             bytes.extend(values.iter().map(|error| byte_of(error / end)));
+            let colours = graph.sheet_of_face.iter().map(|&sheet| SheetGraph::colour(sheet));
+            bytes.extend(colours.map(|colour| (255.0 * colour).round() as u8));
         }
         pack(&bytes)
     }
@@ -130,13 +141,14 @@ impl<'a> View3d<'a> {
             bytes.extend(vertex.wrapping_sub(last).to_le_bytes());
             last = vertex;
         }
-        for (_, axis) in &self.results {
+        for ((_, axis), graph) in self.results.iter().zip(&self.graphs) {
             for sphere in &axis.spheres {
                 let [x, y, z] = sphere.centre.to_array();
                 let numbers = [x, y, z, sphere.radius].map(|number| (number as f32).to_le_bytes());
                 bytes.extend(numbers.as_flattened());
             }
             let vertices = axis.edges.as_flattened().iter().chain(axis.faces.as_flattened());
+            let vertices = vertices.chain(seams(graph).flatten()).chain(&graph.junctions);
             bytes.extend(vertices.flat_map(|vertex| vertex.to_le_bytes()));
         }
         for &vertex in &surface.vertices {
@@ -144,6 +156,11 @@ impl<'a> View3d<'a> {
             bytes.extend(steps.map(|steps| (steps as u16).to_le_bytes()).as_flattened());
         }
     }
+}
+
+/// The edges of all seams.
+fn seams(graph: &SheetGraph) -> impl Iterator<Item = &[u32; 2]> {
+    graph.seams.iter().flat_map(|seam| &seam.edges)
 }
 
 /// An error as a byte: 128 for none, 1 and 255 for the ends and all beyond.

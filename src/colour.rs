@@ -8,6 +8,8 @@ pub enum ColourMap {
     Viridis,
     /// Blue below zero, light grey at it, red above: RdBu of ColorBrewer without its darkest ends.
     Diverging,
+    /// For parts rather than values: Spectral of ColorBrewer, and black at the high end, for lines.
+    Parts,
 }
 
 const VIRIDIS: [[u8; 3]; 9] = [
@@ -34,6 +36,18 @@ const DIVERGING: [[u8; 3]; 9] = [
     [0xB2, 0x18, 0x2B],
 ];
 
+const PARTS: [[u8; 3]; 9] = [
+    [0xD5, 0x3E, 0x4F],
+    [0xF4, 0x6D, 0x43],
+    [0xFD, 0xAE, 0x61],
+    [0xFE, 0xE0, 0x8B],
+    [0xE6, 0xF5, 0x98],
+    [0xAB, 0xDD, 0xA4],
+    [0x66, 0xC2, 0xA5],
+    [0x32, 0x88, 0xBD],
+    [0x10, 0x10, 0x10],
+];
+
 impl ColourMap {
     /// The sRGB colour at a place from 0 to 1, between control points that are evenly spaced.
     pub fn at(self, place: f64) -> [u8; 3] {
@@ -50,6 +64,7 @@ impl ColourMap {
         match self {
             Self::Viridis => "viridis",
             Self::Diverging => "RdBu, reversed",
+            Self::Parts => "Spectral",
         }
     }
 
@@ -57,6 +72,7 @@ impl ColourMap {
         let points = match self {
             Self::Viridis => &VIRIDIS,
             Self::Diverging => &DIVERGING,
+            Self::Parts => &PARTS,
         };
         let last = points.len() - 1;
         // A place that is not a number takes the low end.

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use medial::complex::{LoadedMa, Look, MedialMesh, SphereValues, single_precision_loss};
+use medial::complex::{
+    LoadedMa, Look, MedialMesh, SheetGraph, SheetOptions, SphereValues, single_precision_loss,
+};
 use medial::geometry::trees::Bounds;
 use medial::shape::{Shape, ShapeOptions};
 use medial::surface::SignedDistance;
@@ -103,6 +105,8 @@ enum Colour {
     Stability,
     /// The distance by which each sphere exceeds the surface (red) or falls short of it (blue).
     Error,
+    /// The sheet. Each sheet has spheres of its own, seams and curves are black lines, junctions isolated spheres.
+    Sheet,
 }
 
 impl LookArguments {
@@ -144,8 +148,16 @@ impl LookArguments {
             let values = Some(SphereValues::error(errors(&loaded.mesh, &shape)?));
             return Ok((loaded, Look { values, balls: self.spheres }));
         }
-        let loaded = complex::read_with(from, options.read_options()).map_err(Failure::input)?;
+        let mut loaded =
+            complex::read_with(from, options.read_options()).map_err(Failure::input)?;
         let values = match self.color {
+            Some(Colour::Sheet) => {
+                let sizes = SheetOptions::of_diagonal(diagonal(&loaded.mesh));
+                let graph = SheetGraph::new(&loaded.mesh, sizes);
+                let (painted, values) = graph.painted(&loaded.mesh);
+                loaded.mesh = painted;
+                Some(SphereValues::sheet(values))
+            }
             Some(Colour::Stability) => {
                 Some(SphereValues::stability(&loaded.mesh, diagonal(&loaded.mesh)))
             }

@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use medial::complex::LoadedMa;
-use medial::metrics::{Certificate, Evaluation, Judge, MetricError, Witness, WitnessSide};
+use medial::complex::{LoadedMa, MedialMesh};
+use medial::metrics::{
+    Certificate, Evaluation, Judge, MetricError, Witness, WitnessSide, sheet_difference,
+};
 use medial::shape::{Fit, Shape, ShapeOptions};
 use medial_reports::{measured_rows, significant};
 use serde::Serialize;
@@ -39,6 +41,9 @@ pub struct Arguments {
     /// name such as `2027.1`, or a folder.
     #[arg(long, value_name = "EDITION", conflicts_with_all = ["samples", "seed"])]
     against: Option<PathBuf>,
+    /// Compare the sheets with those of this medial mesh, such as a dense axis of the surface.
+    #[arg(long, value_name = "X.ma")]
+    reference: Option<PathBuf>,
     #[command(flatten)]
     measure: MeasureArguments,
 }
@@ -60,7 +65,12 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let judge = shape
         .judge(input.axis.as_ref(), options)
         .map_err(|error| Failure::at(&arguments.mesh, error))?;
-    let rows = arguments.axes.iter().map(|path| evaluate(path, arguments, (&shape, &judge), &line));
+    let reference = match &arguments.reference {
+        Some(path) => Some(normalised(&read_axis(path, &shape, arguments.fitting)?.0.mesh, &shape)),
+        None => None,
+    };
+    let surface = (&shape, &judge, reference.as_ref());
+    let rows = arguments.axes.iter().map(|path| evaluate(path, arguments, surface, &line));
     let mut rows: Vec<_> = rows.collect();
     drop(line);
     for row in rows.iter_mut().flatten() {
@@ -114,7 +124,7 @@ struct Evaluated {
 fn evaluate(
     path: &Path,
     arguments: &Arguments,
-    (shape, judge): (&Shape, &Judge),
+    (shape, judge, reference): (&Shape, &Judge, Option<&MedialMesh>),
     line: &StageLine,
 ) -> Result<Evaluated, Failure> {
     let failed = |error: MetricError| match error {
@@ -127,16 +137,24 @@ fn evaluate(
     line.at(format!("measuring {}", path.display()));
     let (loaded, fit) = read_axis(path, shape, arguments.fitting)?;
     let LoadedMa { mesh, notes, warnings: defects, .. } = loaded;
-    let to_normal = shape.normalisation();
-    let mesh = mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));
+    let mesh = normalised(&mesh, shape);
     let certified = arguments.certify.map(|tolerance| judge.certify(&mesh, tolerance));
     let mut certified = certified.transpose().map_err(failed)?;
     if let Some(Certificate { witness, .. }) = &mut certified {
         // The point is looked for in the surface file.
-        witness.point = to_normal.backward(witness.point);
+        witness.point = shape.normalisation().backward(witness.point);
     }
-    let evaluation = Evaluation { certified, ..judge.evaluate(&mesh).map_err(failed)? };
+    let mut evaluation = Evaluation { certified, ..judge.evaluate(&mesh).map_err(failed)? };
+    if let (Some(reference), Some(structure)) = (reference, &mut evaluation.structure) {
+        structure.known = Some(sheet_difference(&mesh, reference).map_err(failed)?);
+    }
     Ok(Evaluated { evaluation, fit, place: None, notes, defects })
+}
+
+/// A medial mesh in units of the surface's diagonal.
+fn normalised(mesh: &MedialMesh, shape: &Shape) -> MedialMesh {
+    let to_normal = shape.normalisation();
+    mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p))
 }
 
 /// The evaluations next to each other: a row for each metric, a column for each file.
@@ -183,6 +201,17 @@ fn print_table(
         table[3].push(counts.faces.to_string());
         table[4].push(format!("{:?}", evaluation.betti));
     }
+    if evaluations.iter().any(|evaluation| evaluation.structure.is_some()) {
+        let sizes = |e: &&Evaluation| {
+            e.structure
+                .as_ref()
+                .map(|s| &s.graph)
+                .map(|g| format!("{} / {} / {}", g.sheets, g.seams, g.junctions))
+        };
+        let mut row = vec!["sheets / seams / junctions".to_owned()];
+        row.extend(evaluations.iter().map(|e| sizes(e).unwrap_or_default()));
+        table.push(row);
+    }
     table.extend(measured_rows(&evaluations).into_iter().map(|(metric, mut values)| {
         values.insert(0, metric);
         values
@@ -225,6 +254,15 @@ fn print_evaluation(evaluation: &Evaluation) {
         print_line(&format!("  {metric:<32} {}", values.remove(0)));
     }
     print_line(&format!("  {:<32} {betti}", "Betti numbers"));
+    if let Some(structure) = &evaluation.structure {
+        print_line(&format!("  {:<32} {}", "structure", structure.graph));
+        if let Some(known) = &structure.known {
+            let (matched, missing, spurious) =
+                (known.matched.len(), known.missing.len(), known.spurious.len());
+            let text = format!("{matched} matched, {missing} missing, {spurious} spurious");
+            print_line(&format!("  {:<32} {text}", "sheets of the reference"));
+        }
+    }
     if let Some(certified) = evaluation.certified {
         let Witness { point, on } = certified.witness;
         let on = match on {

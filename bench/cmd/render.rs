@@ -10,7 +10,7 @@ use medial::shape::{Cost, Shape, ShapeOptions};
 use medial::surface::{SignedDistance, TriMesh};
 use medial_reports::render::{
     Background, Bar, Camera, ColourBy, Errors, Frame, Layer, Panel, Picture, RenderError, Scale,
-    Scene, Strip, strip,
+    Scene, Strip, painted, strip,
 };
 use medial_reports::significant;
 use serde_json::json;
@@ -78,6 +78,8 @@ enum Show {
     /// The reconstruction coloured by its distance to the surface: red outside, blue inside, glass where parts are
     /// missing. Several medial meshes are drawn above their reconstructions.
     Error,
+    /// The sheets of the medial mesh in colours of their own, seams and curves black, within the surface as glass.
+    Structure,
 }
 
 /// The quantity behind the colours of a medial mesh.
@@ -109,7 +111,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let show = show(arguments)?;
     let line = StageLine::new(global.stages());
     line.at("reading");
-    let read = Read::new(arguments)?;
+    let mut read = Read::new(arguments)?;
+    read.show(show);
     let Drawn { png, object, text } = drawn(arguments, show, &read, &|stage| line.at(stage))?;
     files::write(&arguments.output, &png)?;
     drop(line);
@@ -137,7 +140,9 @@ pub fn draw(
     let (names, axes): (Vec<_>, Vec<_>) = axes.into_iter().unzip();
     arguments.axes = names.iter().map(PathBuf::from).collect();
     let show = show(&arguments)?;
-    let drawn = drawn(&arguments, show, &Read { shape, names, axes, warnings: vec![] }, at)?;
+    let mut read = Read { shape, names, axes, painted: vec![], warnings: vec![] };
+    read.show(show);
+    let drawn = drawn(&arguments, show, &read, at)?;
     Ok((drawn.png, drawn.object))
 }
 
@@ -209,7 +214,7 @@ fn show(arguments: &Arguments) -> Result<Show, Failure> {
             (show, ": no medial mesh; name one after the surface")
         }
         (Some(show @ (Show::Surface | Show::Reconstruction)), 2..) => {
-            (show, " with several medial meshes: expected axis or error")
+            (show, " with several medial meshes: expected axis, structure or error")
         }
         (Some(show), _) => return Ok(show),
     };
@@ -223,6 +228,8 @@ struct Read {
     /// Captions of the medial meshes.
     names: Vec<String>,
     axes: Vec<MedialMesh>,
+    /// Their sheets, if these are shown.
+    painted: Vec<MedialMesh>,
     warnings: Vec<String>,
 }
 
@@ -239,7 +246,17 @@ impl Read {
         }
         let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into();
         let names = arguments.axes.iter().map(stem).collect();
-        Ok(Self { shape, names, axes, warnings })
+        Ok(Self { shape, names, axes, painted: vec![], warnings })
+    }
+
+    fn show(&mut self, show: Show) {
+        if show == Show::Structure {
+            self.painted = self.axes.iter().map(painted).collect();
+        }
+    }
+
+    fn colour(&self, arguments: &Arguments) -> ColourBy {
+        if self.painted.is_empty() { arguments.color.into() } else { ColourBy::Sheets }
     }
 }
 
@@ -255,6 +272,7 @@ fn side_by_side(
         let count = counted(axis.spheres.len() as u64, "sphere");
         let caption = format!("{}, {count}", read.names[k]);
         // Panels differ only by file name and count.
+        let axis = read.painted.get(k).unwrap_or(axis);
         panels.push(Panel { axis, caption, errors: deviations.get(k).map(Deviation::errors) });
     }
     let common = Strip {
@@ -264,7 +282,7 @@ fn side_by_side(
         size: arguments.size,
         across: usize::MAX,
         background: arguments.background,
-        colour: arguments.color.into(),
+        colour: read.colour(arguments),
         max_error: arguments.max_error,
     };
     strip(&panels, &common)
@@ -280,8 +298,9 @@ fn single(
 ) -> Result<Picture, RenderError> {
     let surface = read.shape.mesh();
     let (layers, bar) = match (show, read.axes.first(), made) {
-        (Show::Axis, Some(mesh), _) => {
-            let (colour, bar) = ColourBy::from(arguments.color).of(&[mesh], 1.0);
+        (Show::Axis | Show::Structure, Some(mesh), _) => {
+            let mesh = read.painted.first().unwrap_or(mesh);
+            let (colour, bar) = read.colour(arguments).of(&[mesh], 1.0);
             (vec![Layer::Axis { mesh, colour }, Layer::Glass(surface)], bar)
         }
         (Show::Reconstruction, _, Some(made)) => (vec![Layer::Surface(&made.mesh)], None),

@@ -1,7 +1,6 @@
 //! The target of the union of the primitives: samples of the surface, points inside the solid, and
 //! depths of any point.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use medial::Vec3;
@@ -11,7 +10,9 @@ use medial::geometry::{Cone, Slab};
 use medial::metrics::{DistanceOptions, FINEST, MetricError, PeakSearch, certify};
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::SimplifyError;
-use medial::surface::{Closest, InsideTest, Sampling, Side, TriMesh, TriangleBvh, sample};
+use medial::surface::{
+    Closest, InsideTest, Sampling, Side, TriMesh, TriangleBvh, sample, sharp_edges,
+};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
@@ -283,17 +284,11 @@ impl Goal {
 
     /// Points along the edges at which the surface turns by more than 30 degrees, about `count` of them, evenly.
     pub fn along_sharp_edges(&self, count: f64) -> Vec<Vec3> {
-        let mut first = HashMap::new();
-        let mut sharp = Vec::new();
-        for (f, &[a, b, c]) in (0..).zip(&self.surface.faces) {
-            for [a, b] in [[a, b], [b, c], [c, a]] {
-                let ends = [a.min(b), a.max(b)];
-                let other = *first.entry(ends).or_insert(f);
-                if other != f && self.normal(other).dot(self.normal(f)) < SHARP {
-                    sharp.push(ends.map(|v| self.surface.vertices[v as usize]));
-                }
-            }
-        }
+        let flat: Vec<Vec3> =
+            (0..self.surface.faces.len() as u32).map(|f| self.normal(f)).collect();
+        let sharp = sharp_edges(&self.surface, &flat, SHARP).into_iter();
+        let sharp = sharp.map(|edge| edge.vertices.map(|v| self.surface.vertices[v as usize]));
+        let sharp: Vec<[Vec3; 2]> = sharp.collect();
         let length: f64 = sharp.iter().map(|[a, b]| a.distance(*b)).sum();
         let spacing = (length / count).max(CLOSEST);
         let mut left = 0.5;

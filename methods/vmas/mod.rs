@@ -12,7 +12,7 @@
 //!    with fewer than 5 points (4 vertices) are dropped; these points have no sphere in this round.
 //! 2. *Refit* (`refit.rs`): Gauss-Newton on the points of each sphere.
 //! 3. *Correct* (`sampling.rs`): the fitted centre is pushed back to the medial axis, to the shrinking ball
-//!    (`shrinking_ball.rs`) of the nearest surface point. The fitted radius is not used.
+//!    ([`medial::surface::shrinking_ball`]) of the nearest surface point. The fitted radius is not used.
 //! 4. *Errors* (`sampling.rs`): `E_s` for each sphere; their sum is the total error.
 //! 5. *Split* (`sampling.rs`): where the total error is at rest, and every 10 rounds, the spheres with the largest
 //!    `E_s` are split, at most 20 % of them and at most 10, no two adjacent ones: the shrinking ball
@@ -78,7 +78,6 @@
 mod points;
 mod refit;
 mod sampling;
-mod shrinking_ball;
 #[cfg(test)]
 mod tests;
 

@@ -6,13 +6,12 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::RunContext;
-use medial::surface::{InsideTest, Side, TriangleBvh};
+use medial::surface::{Ball, End, InsideTest, Side, Touched, TriangleBvh, shrinking_ball};
 use rayon::prelude::*;
 use wide::f64x4;
 
 use super::points::{GROUP, SurfacePoints, area_vector, in_lanes};
 use super::refit::{Residuals, refit};
-use super::shrinking_ball::{Ball, End, Touched, shrinking_ball};
 use super::{Connect, Points, VmasParams, edges, faces};
 use crate::Result;
 

@@ -113,6 +113,8 @@ class Evaluation:
     certified: Certificate | None
     axis: dict[str, Any] | None = field(hash=False)
     """Distances to the exactly known axis of a built-in shape."""
+    structure: dict[str, Any] | None = field(hash=False)
+    """Sheets, seams, contacts and sharp edges: METHODOLOGY.md defines the keys."""
     diagonal: Annotated[float, "unit of the mesh"]
     """The bounding-box diagonal of the mesh."""
     seed: int
@@ -155,6 +157,7 @@ class Evaluation:
         values.update(
             certified=certified,
             axis=values.get("axis"),
+            structure=values.get("structure"),
             quality=TriangleQuality(**values["quality"]),
             spikes=Spikes(**spikes),
             counts=Counts(**values["counts"]),

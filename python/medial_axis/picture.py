@@ -63,7 +63,7 @@ def render(
     mesh: Mesh | MedialAxis,
     axes: MedialAxis | Iterable[MedialAxis] = (),
     *,
-    show: Literal["surface", "axis", "reconstruction", "error"] | None = None,
+    show: Literal["surface", "axis", "structure", "reconstruction", "error"] | None = None,
     color: Literal["radius", "plain"] = "radius",
     camera: str | Sequence[float] | None = None,
     up: str | Sequence[float] | None = None,

@@ -47,15 +47,21 @@ const viewOf = (() => {
     const [vertices, faces] = head.surface;
     const indices = take(Uint32Array, 3 * faces);
     for (let k = 1; k < indices.length; k += 1) indices[k] += indices[k - 1];
-    const results = head.results.map(({ label, counts: [n, e, f] }) => ({
+    const results = head.results.map(({ label, counts: [n, e, f], seams, structure }) => ({
       label,
+      structure,
       spheres: take(Float32Array, 4 * n),
       edges: take(Uint32Array, 2 * e),
       faces: take(Uint32Array, 3 * f),
+      seams: take(Uint32Array, 2 * seams),
+      junctions: take(Uint32Array, structure[2]),
     }));
     const steps = take(Uint16Array, 3 * vertices);
     const positions = Float32Array.from(steps, (step, k) => head.low[k % 3] + head.step * step);
-    for (const result of results) result.errors = take(Uint8Array, vertices);
+    for (const result of results) {
+      result.errors = take(Uint8Array, vertices);
+      result.sheets = take(Uint8Array, result.faces.length / 3);
+    }
     return { ...head, indices, positions, results };
   };
 
@@ -190,6 +196,28 @@ const viewOf = (() => {
       }
       return [coloured(soup), balls(result, () => 2.4 * thin), glass()];
     };
+    // Each sheet in its colour, seams as black tubes that meet in balls.
+    const sheets = (result) => {
+      const soup = new Soup();
+      const thick = 0.003 * view.diagonal;
+      const black = colour(2, 1);
+      simplices(result.faces, 3).forEach((face, k) => {
+        const corners = face.map((v) => sphereOf(result, v).centre);
+        const [a, b, c] = corners;
+        const normal = unit(cross(subtract(b, a), subtract(c, a)));
+        for (const corner of corners) soup.corner(corner, normal, colour(2, result.sheets[k] / 255));
+      });
+      for (const edge of simplices(result.seams, 2)) {
+        const [a, b] = edge.map((v) => sphereOf(result, v).centre);
+        tube(soup, 6, a, b, [thick, thick], 0, [black, black]);
+      }
+      const balls = [...result.junctions].map((v) => {
+        const ball = new T.Mesh(new T.IcosahedronGeometry(2.4 * thick, 2), new T.MeshLambertMaterial({ color: 0x101010 }));
+        ball.position.set(...sphereOf(result, v).centre);
+        return ball;
+      });
+      return [coloured(soup), ...balls, glass()];
+    };
     // The union: the depth buffer removes hidden parts of primitives.
     const union = (result) => {
       const soup = new Soup();
@@ -223,11 +251,12 @@ const viewOf = (() => {
       }
       return [coloured(soup), balls(result, (radius) => radius)];
     };
-    return { axis, union, errors: (result) => [errors(result)], surface: () => [surface()] };
+    return { axis, sheets, union, errors: (result) => [errors(result)], surface: () => [surface()] };
   };
 
   const KINDS = [
     ["axis", "medial mesh"],
+    ["sheets", "sheets and seams"],
     ["union", "reconstruction"],
     ["errors", "error on the surface"],
     ["surface", "surface"],
@@ -265,7 +294,7 @@ const viewOf = (() => {
       };
       this.of = select("result", view.results.map((result, k) => [k, result.label]), chosen[0]);
       // Without a surface there are the medial meshes alone.
-      this.kind = select("quantity", view.indices.length ? KINDS : KINDS.slice(0, 2), chosen[1]);
+      this.kind = select("quantity", view.indices.length ? KINDS : KINDS.slice(0, 3), chosen[1]);
       this.canvas = make("canvas", { tabindex: 0 });
       this.caption = make("figcaption");
       this.figure = make("figure", { class: "side" }, make("div", { class: "bar" }, this.of, this.kind), this.canvas, this.caption);
@@ -293,6 +322,7 @@ const viewOf = (() => {
       this.caption.textContent = {
         errors: `red: the reconstruction reaches beyond, blue: it falls short; errors above ${percent(end)} of the diagonal have the last colour`,
         surface: "the input",
+        sheets: `${["sheets", "seams", "junctions"].map((word, k) => `${result.structure[k]} ${word}`).join(", ")}; seams are black`,
       }[kind] ?? `colour: radius, ${least} to ${most} of the diagonal`;
       this.of.disabled = kind === "surface";
       const name = KINDS.find(([key]) => key === kind)[1];

@@ -10,7 +10,9 @@ mod svg;
 use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, Entry, reached, rises};
-use crate::metric::{HAUSDORFF, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS};
+use crate::metric::{
+    COMPLETENESS, HAUSDORFF, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS,
+};
 use crate::summary::{CountSummary, NativeCurve};
 use crate::text::{grouped, significant};
 
@@ -90,12 +92,13 @@ impl Figure {
 /// A kind of figures, one for each mesh and one of the means over all: name, title, and the metric upwards.
 struct Kind(&'static str, &'static str, &'static Metric);
 
-const KINDS: [Kind; 5] = [
+const KINDS: [Kind; 6] = [
     Kind("hausdorff", "Hausdorff error against spheres", &HAUSDORFF),
     Kind("time", "Hausdorff error against time", &HAUSDORFF),
     Kind("mean", "Mean error against spheres", &MEAN_ERROR),
     Kind("angles", "Triangle quality: mean smallest angle", &MIN_ANGLE),
     Kind("spikes", "Spikes left", &SPIKES),
+    Kind("structure", "Axis missed against spheres", &COMPLETENESS),
 ];
 
 impl Kind {
@@ -115,6 +118,7 @@ impl Kind {
             "angles" => "mean smallest angle (degrees)",
             "spikes" => "spikes",
             "mean" => "mean error (% of diagonal)",
+            "structure" => "axis missed, p95 (% of diagonal)",
             _ => "Hausdorff error (% of diagonal)",
         };
         let scale = if self.is_error() { Scale::Log } else { Scale::Linear };

@@ -22,7 +22,7 @@ pub use camera::{Camera, Frame};
 pub use medial::ColourMap;
 pub use picture::{Background, Bar, Picture};
 pub use scene::{Layer, Scale, Scene};
-pub use strip::{ColourBy, Errors, Panel, Strip, strip};
+pub use strip::{ColourBy, Errors, Panel, Strip, painted, strip};
 
 /// The longest side of a picture, in pixels. Edge functions stay exact up to it.
 pub const MOST_PIXELS: usize = 8192;

@@ -2,7 +2,7 @@
 
 use medial::complex::{MedialMesh, Sphere};
 use medial::geometry::DisjointSets;
-use medial::surface::TriMesh;
+use medial::surface::{TriMesh, smooth_normals};
 use medial::{ColourMap, Vec3};
 use rayon::prelude::*;
 
@@ -224,10 +224,11 @@ fn surface_facets(mesh: &TriMesh, place: impl Fn(u32, Vec3) -> f32 + Sync) -> Ve
             u.cross(v).normalize_or_zero()
         })
         .collect();
-    let (normals, sharp) = (smooth_normals(mesh, &flat), sharp_sides(mesh, &flat));
+    let (normals, sharp) =
+        (smooth_normals(mesh, &flat, CREASE.to_radians().cos()), sharp_sides(mesh, &flat));
     (mesh.faces.par_iter().enumerate())
         .map(|(face, corners)| {
-            let normals = normals[face];
+            let normals = normals(face);
             let places = std::array::from_fn(|k| place(corners[k], normals[k]));
             let lines = sharp[face].map(u8::from);
             Facet { corners: mesh.triangle(face), normals, places, lines }
@@ -348,51 +349,9 @@ fn ball(centre: Vec3, radius: f64, place: f32, into: &mut Vec<Facet>) {
 /// Faces at a larger angle to each other, in degrees, meet in a sharp edge.
 const CREASE: f64 = 35.0;
 
-/// More faces than this at a vertex are the fan of a flat disc or the tip of a cone, where the normal of each face is
-/// taken as it is. The cost is quadratic in this number.
-const MOST_AROUND: usize = 64;
-
 /// Sharp edges that are connected are shown if they are longer together than this share of the surface's diagonal:
 /// shorter ones are noise of a smooth surface, a drilled hole is longer.
 const SHORTEST: f64 = 0.06;
-
-/// Normals at the corners of every face that are smooth where the surface is: round parts look round, and edges of
-/// machine parts stay sharp. Cost linear in the surface's size.
-///
-/// A corner takes the mean of the faces around its vertex that are within [`CREASE`] of its own face, weighted by the
-/// sine of their angle there over the lengths of its sides, which is exact on a sphere (N. Max, "Weights for computing
-/// vertex normals from facet normals", J. Graphics Tools 4 (1999)).
-fn smooth_normals(mesh: &TriMesh, flat: &[Vec3]) -> Vec<[Vec3; 3]> {
-    // The faces around each vertex, and which of their corners it is.
-    let mut around: Vec<Vec<(usize, usize)>> = vec![vec![]; mesh.vertices.len()];
-    for (face, corners) in mesh.faces.iter().enumerate() {
-        for (corner, &vertex) in corners.iter().enumerate() {
-            around[vertex as usize].push((face, corner));
-        }
-    }
-    let smooth = CREASE.to_radians().cos();
-    let corner = |face: usize, vertex: u32| {
-        let around = &around[vertex as usize];
-        if around.len() > MOST_AROUND {
-            return flat[face];
-        }
-        let alike = around.iter().filter(|(other, _)| flat[face].dot(flat[*other]) > smooth);
-        let sum: Vec3 = alike
-            .map(|&(face, corner)| {
-                let points = mesh.triangle(face);
-                let [a, b, c] = [0, 1, 2].map(|k| points[(corner + k) % 3]);
-                let (u, v) = (b - a, c - a);
-                let lengths = u.length() * v.length();
-                let sine = u.cross(v).length() / lengths;
-                // Zero lengths: a face without area has no weight.
-                if sine.is_finite() { sine / lengths * flat[face] } else { Vec3::ZERO }
-            })
-            .sum();
-        sum.normalize_or(flat[face])
-    };
-    let faces = mesh.faces.par_iter().enumerate();
-    faces.map(|(face, corners)| corners.map(|vertex| corner(face, vertex))).collect()
-}
 
 /// For each face whether its side from corner `k` to `k + 1` is sharp and part of a long crease. Cost that of a sort of
 /// the sides.

@@ -1,6 +1,7 @@
 //! The strip: several medial meshes of one shape side by side, from one camera and with one scale.
 
-use medial::complex::MedialMesh;
+use medial::ColourMap;
+use medial::complex::{MedialMesh, SheetGraph, SheetOptions};
 use medial::surface::TriMesh;
 
 use super::RenderError;
@@ -17,11 +18,25 @@ pub enum ColourBy {
     Radius,
     /// One colour for sheets, one for curves.
     Plain,
+    /// Sheets in colours of their own, seams black: of meshes whose radii are those of [`painted`].
+    Sheets,
+}
+
+/// The sheets, seams and junctions of a medial mesh in diagonals of its surface, for [`ColourBy::Sheets`].
+pub fn painted(mesh: &MedialMesh) -> MedialMesh {
+    let (mut painted, colours) = SheetGraph::new(mesh, SheetOptions::default()).painted(mesh);
+    for (sphere, colour) in painted.spheres.iter_mut().zip(colours) {
+        sphere.radius = colour;
+    }
+    painted
 }
 
 impl ColourBy {
     /// The colours for some medial meshes of a shape with this bounding-box diagonal, and the bar that explains them.
     pub fn of(self, meshes: &[&MedialMesh], diagonal: f64) -> (Option<Scale>, Option<Bar>) {
+        if self == Self::Sheets {
+            return (Some(Scale { lo: 0.0, hi: 1.0, map: ColourMap::Parts }), None);
+        }
         let scale = (self == Self::Radius).then(|| Scale::radii(meshes.iter().copied()));
         let title = vec!["radius".into(), "% of diagonal".into()];
         let bar = |scale| Bar { scale, times: 100.0 / diagonal, title, note: vec![] };

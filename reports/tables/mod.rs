@@ -3,6 +3,7 @@
 
 mod csv;
 mod mesh;
+mod structure;
 
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
@@ -11,6 +12,7 @@ use crate::text::{escape_html, printable};
 
 pub(crate) use self::csv::{flatten, to_csv, warnings};
 pub(crate) use self::mesh::{Best, mesh_table, remark, topology_word};
+pub(crate) use self::structure::structure_table;
 
 /// A table before it takes a format.
 #[derive(Clone, Default, Serialize)]

@@ -5,6 +5,7 @@ mod conforming;
 mod contour;
 mod formats;
 mod mesh;
+mod sheets;
 mod topology;
 mod union;
 pub mod union_axis;
@@ -19,6 +20,7 @@ pub use formats::{
 pub use mesh::Incidence;
 pub use mesh::{ComplexError, Contacts, MedialMesh};
 pub use mesh::{Crossings, crossing_faces, faces_cross};
+pub use sheets::{Seam, SheetGraph, SheetOptions};
 pub use topology::cubical_betti;
 pub use topology::{betti, euler};
 pub use union::{MedialUnion, NearestPrimitive, Primitive, Readings, UnionError};

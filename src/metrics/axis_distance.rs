@@ -126,8 +126,8 @@ fn coverage(truth: &PreparedAxis, back: &Directed) -> Vec<SheetCoverage> {
 }
 
 /// A medial mesh as a set of points with radii.
-struct AxisParts {
-    triangles: Vec<[DVec4; 3]>,
+pub(super) struct AxisParts {
+    pub triangles: Vec<[DVec4; 3]>,
     /// Edges without a face.
     segments: Vec<[DVec4; 2]>,
     spheres: Vec<DVec4>,
@@ -152,7 +152,7 @@ impl AxisParts {
     }
 
     /// All parts: segments and points as triangles of no area.
-    fn simplices(&self) -> Vec<[DVec4; 3]> {
+    pub fn simplices(&self) -> Vec<[DVec4; 3]> {
         let mut parts = self.triangles.clone();
         parts.extend(self.segments.iter().map(|&[a, b]| [a, b, b]));
         parts.extend(self.isolated.iter().map(|&c| [c; 3]));
@@ -162,9 +162,9 @@ impl AxisParts {
 
 /// An axis, prepared to be sampled and to be measured against.
 pub(super) struct PreparedAxis {
-    parts: AxisParts,
+    pub parts: AxisParts,
     sheet_of_face: Vec<u32>,
-    in_space: TriangleBvh,
+    pub in_space: TriangleBvh,
     with_radius: LiftedAxis,
 }
 
@@ -226,7 +226,7 @@ fn directed(from: &PreparedAxis, to: &PreparedAxis, options: &AxisOptions) -> Di
 }
 
 /// `count` points, equally spaced along the list of segments; none when they have no length.
-fn sample_segments(segments: &[[DVec4; 2]], count: usize) -> Vec<DVec4> {
+pub(super) fn sample_segments(segments: &[[DVec4; 2]], count: usize) -> Vec<DVec4> {
     let total: f64 = segments.iter().map(length).sum();
     let mut points = Vec::new();
     if !(total > 0.0 && total.is_finite()) {
@@ -260,7 +260,7 @@ fn length([a, b]: &[DVec4; 2]) -> f64 {
 const MIN_SINE_SQUARED: f64 = 1e-24;
 
 /// The sphere as a point.
-fn lifted(sphere: Sphere) -> DVec4 {
+pub(super) fn lifted(sphere: Sphere) -> DVec4 {
     sphere.centre.extend(sphere.radius)
 }
 

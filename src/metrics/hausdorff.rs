@@ -233,17 +233,17 @@ fn largest(values: &[f64]) -> f64 {
 }
 
 /// Mean, root mean square and percentiles of some values.
-struct Summary {
-    mean: f64,
-    rms: f64,
-    p95: f64,
-    p99: f64,
+pub(super) struct Summary {
+    pub mean: f64,
+    pub rms: f64,
+    pub p95: f64,
+    pub p99: f64,
 }
 
 impl Summary {
     /// Percentiles are nearest ranks: the smallest value that at least this share of all values does
     /// not exceed.
-    fn new(values: &[f64]) -> Self {
+    pub fn new(values: &[f64]) -> Self {
         let count = values.len().max(1) as f64;
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);

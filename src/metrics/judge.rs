@@ -8,6 +8,7 @@ use super::axis_distance::{PreparedAxis, prepared_axis_distance};
 use super::hausdorff::distances_with_envelope;
 use super::samples::{Pose, SurfaceSamples};
 use super::spikes::{centres_outside, protrusion};
+use super::structure::{Structure, StructureSurface};
 use super::volume::{Sides, box_in, volume_error_in};
 use super::{
     AxisOptions, Certificate, DistanceOptions, MetricError, VolumeOptions, certify, spikes,
@@ -64,6 +65,7 @@ pub struct Judge {
     /// The true axis. Prepared eagerly: prepared on demand inside a parallel task, a worker could
     /// wait for itself.
     true_axis: Option<Result<PreparedAxis, MetricError>>,
+    structure: StructureSurface,
     options: JudgeOptions,
 }
 
@@ -79,7 +81,10 @@ impl Judge {
     ) -> Self {
         let true_axis = truth.axis.as_ref().map(PreparedAxis::new);
         let samples = SurfaceSamples::new(&surface, options.samples, options.seed);
-        Self { surface, tree, inside, truth, samples, true_axis, options }
+        let points = samples.as_ref().map_or(&[][..], |samples| &samples.points[..samples.uniform]);
+        let (on_tree, on_inside) = (Arc::clone(&tree), Arc::clone(&inside));
+        let structure = StructureSurface::new(&surface, on_tree, on_inside, points);
+        Self { surface, tree, inside, truth, samples, true_axis, structure, options }
     }
 
     /// How results are measured.
@@ -98,7 +103,7 @@ impl Judge {
         let (mesh, union) = &samples.ordered(mesh)?;
         let options = self.distance_options();
         // In parallel with each other, because each has serial parts.
-        let ((distances, volume_error), (axis, (quality, spikes, betti))) = rayon::join(
+        let ((distances, volume_error), (axis, (quality, spikes, betti, structure))) = rayon::join(
             || {
                 rayon::join(
                     || {
@@ -116,7 +121,10 @@ impl Judge {
             || {
                 rayon::join(
                     || self.true_axis.as_ref().map(|truth| self.axis_distances(mesh, truth)),
-                    || (triangle_quality(mesh), spikes(mesh), betti(mesh)),
+                    || {
+                        let betti = betti(mesh);
+                        (triangle_quality(mesh), spikes(mesh), betti, self.structure(mesh, betti))
+                    },
                 )
             },
         );
@@ -148,6 +156,7 @@ impl Judge {
             expected_betti: self.truth.betti,
             counts: counts(mesh),
             axis,
+            structure: Some(structure?),
             diagonal: self.truth.diagonal,
             seed: self.options.seed,
         })
@@ -205,6 +214,13 @@ impl Judge {
         };
         let bounds = box_in(pose, &self.surface, &mesh.spheres);
         volume_error_in(pose, bounds, &sides, &options).map(Some)
+    }
+
+    fn structure(&self, mesh: &MedialMesh, betti: [u64; 3]) -> Result<Structure, MetricError> {
+        let cavities = self.truth.betti.map_or(0, |betti| betti[2]);
+        let pockets = betti[2].saturating_sub(cavities);
+        let axis = PreparedAxis::new(mesh)?;
+        Ok(self.structure.measure(mesh, &axis, pockets, self.truth.axis.as_ref()))
     }
 
     fn axis_distances(
@@ -322,6 +338,9 @@ pub struct Evaluation {
     /// Distances to the exactly known medial axis, where the shape carries one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<AxisDistances>,
+    /// Sheets, seams and features.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub structure: Option<Structure>,
     /// Bounding-box diagonal of the input, in the input's units.
     pub diagonal: f64,
     /// Seed of every random sample.

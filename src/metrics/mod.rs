@@ -14,6 +14,7 @@ mod hausdorff;
 mod judge;
 mod samples;
 mod spikes;
+mod structure;
 mod sweep;
 mod union_topology;
 mod volume;
@@ -28,5 +29,10 @@ pub use judge::{
     SheetCoverage, Spikes, TriangleQuality, Truth, counts, triangle_quality,
 };
 pub use spikes::{FIN_ANGLE, IDLE_PROTRUSION, RATIO_THRESHOLDS, SPIKE_ANGLE, spikes};
+pub use structure::{
+    CONTACT, Centrality, Completeness, ContactTable, ContactType, Features, GraphSizes, Outside,
+    REACHED, SHARP_ANGLE, SheetDifference, SheetPair, Structure, StructureSurface,
+    sheet_difference,
+};
 pub use union_topology::{topology_warning, union_betti};
 pub use volume::{VolumeOptions, enclosed_volume, volume_error};

@@ -225,7 +225,7 @@ pub(super) fn centres_outside(mesh: &MedialMesh, inside: &InsideTest) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::sync::Arc;
 
     use proptest::prelude::*;
@@ -242,7 +242,7 @@ mod tests {
     }
 
     /// The exact medial axis of a 3 by 2 by 1 box, divided by its diagonal: 13 sheets on 12 spheres.
-    fn box_axis() -> MedialMesh {
+    pub(in crate::metrics) fn box_axis() -> MedialMesh {
         let half = Vec3::new(1.5, 1.0, 0.5) / 14f64.sqrt();
         let signs = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
         let inner =

@@ -216,6 +216,23 @@ impl TriangleBvh {
         found
     }
 
+    /// Reports every face that is not farther away from `p` than `distance`, with the point of it that is closest, in
+    /// the order of the tree.
+    pub fn each_within(&self, p: Vec3, distance: f64, mut each: impl FnMut(u32, Vec3)) {
+        let limit = padded(distance, self.slack).powi(2);
+        let squared = inclusive_square(distance);
+        self.tree.search_around(p, limit, |places| {
+            for place in places {
+                let found = self.frames[place].distance_squared(p);
+                if found <= squared {
+                    let closest = self.describe(p, place, found);
+                    each(closest.face, closest.point);
+                }
+            }
+            limit
+        });
+    }
+
     fn closest_at(&self, p: Vec3, start: u32) -> (u32, Closest) {
         let found = self.nearest(Nearest::starting(self, p, start as usize));
         (found.place as u32, self.describe(p, found.place, found.squared))

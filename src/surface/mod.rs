@@ -12,6 +12,7 @@
 mod check;
 mod closest;
 mod contract;
+mod creases;
 mod inside;
 mod mend;
 mod mesh;
@@ -20,6 +21,7 @@ mod read;
 mod repair;
 mod report;
 mod sample;
+mod shrinking_ball;
 mod topology;
 
 use std::path::Path;
@@ -30,6 +32,7 @@ use crate::Vec3;
 
 pub use closest::{BvhError, Closest, Feature, TriangleBvh};
 pub use contract::{Contraction, Folds, contract_short_edges, crust_surface};
+pub use creases::{SharpEdge, sharp_edges, smooth_normals};
 pub use inside::{InsideTest, Side, SignedDistance};
 pub use mend::{Components, MendOptions, mend, mend_bytes};
 #[cfg(test)]
@@ -38,6 +41,7 @@ pub use mesh::{Normalisation, TriMesh, write};
 pub use read::Format;
 pub use report::{Fault, Place, Repair, SurfaceError, SurfaceReport, VertexName};
 pub use sample::{ParseSamplingError, Sampling, sample, sample_with_faces};
+pub use shrinking_ball::{Ball, End, Touched, shrinking_ball};
 
 /// A surface that bounds a solid: closed, manifold, oriented outward, with positive volume.
 #[derive(Clone, Debug, PartialEq)]

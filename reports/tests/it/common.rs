@@ -147,6 +147,7 @@ fn evaluation(error: f64, wobble: f64, count: usize, rank: usize) -> Evaluation 
             nonmanifold_edges: 12,
         },
         axis: None,
+        structure: None,
         diagonal: 1.238,
         seed: 7,
         warnings: Vec::new(),

@@ -66,6 +66,13 @@ impl SphereValues {
         Self { name: "stability", values, low: 0.0, high: 1.0, map: ColourMap::Viridis, meaning }
     }
 
+    /// Places in [`ColourMap::Parts`], of spheres that each belong to one sheet; see
+    /// [`SheetGraph::painted`](crate::complex::SheetGraph::painted).
+    pub fn sheet(values: Vec<f64>) -> Self {
+        let meaning = "sheets by colour, seams and curves black";
+        Self { name: "sheet", values, low: 0.0, high: 1.0, map: ColourMap::Parts, meaning }
+    }
+
     /// Errors of either sign, zero in the middle of the colours: of each sphere, by how much it reaches out of the
     /// surface (positive) or falls short of it (negative), in the unit of the mesh. 99 % of them are within the ends,
     /// so that a single bad sphere does not make all others look alike.

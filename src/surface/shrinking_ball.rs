@@ -9,10 +9,10 @@
 //! is the surface point nearest to the centre, again and again; `r` decreases, and in the end the ball is
 //! empty.
 
-use medial::Vec3;
-use medial::complex::Sphere;
-use medial::geometry::trees::PointTree;
-use medial::surface::TriangleBvh;
+use super::TriangleBvh;
+use crate::Vec3;
+use crate::geometry::Sphere;
+use crate::geometry::trees::PointTree;
 
 /// Steps at most.
 const STEPS: usize = 30;
@@ -29,8 +29,10 @@ const IN_FRONT: f64 = 1e-12;
 
 /// The points that a ball may touch.
 #[derive(Clone, Copy)]
-pub(super) enum Touched<'a> {
+pub enum Touched<'a> {
+    /// The points of a tree.
     Points(&'a PointTree, &'a [Vec3]),
+    /// Every point of a surface.
     Mesh(&'a TriangleBvh),
 }
 
@@ -52,16 +54,20 @@ impl Touched<'_> {
 
 /// A ball that has been shrunk.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Ball {
+pub struct Ball {
+    /// The ball.
     pub sphere: Sphere,
+    /// The other contact, if it shrank.
+    pub contact: Option<Vec3>,
     /// Times that it shrank.
     pub steps: usize,
+    /// Why it shrinks no further.
     pub end: End,
 }
 
 /// Why a ball shrinks no further.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum End {
+pub enum End {
     /// It is empty.
     Empty,
     /// The next contact is too near to the first, seen from the centre.
@@ -74,9 +80,9 @@ pub(super) enum End {
 
 /// The ball that touches at `p`, with outward unit normal `n`. `side` is the longest side of the bounding
 /// box: no ball inside is as large.
-pub(super) fn shrinking_ball(p: Vec3, n: Vec3, side: f64, touched: Touched<'_>) -> Ball {
+pub fn shrinking_ball(p: Vec3, n: Vec3, side: f64, touched: Touched<'_>) -> Ball {
     let half_separation = (0.5 * SEPARATION.to_radians()).sin();
-    let (mut radius, mut steps) = (side, 0);
+    let (mut radius, mut steps, mut contact) = (side, 0, None);
     let end = loop {
         if steps == STEPS {
             break End::StepLimit;
@@ -99,16 +105,16 @@ pub(super) fn shrinking_ball(p: Vec3, n: Vec3, side: f64, touched: Touched<'_>) 
         if steps > 0 && chord.length() < 2.0 * smaller * half_separation {
             break End::Noise;
         }
-        (radius, steps) = (smaller, steps + 1);
+        (radius, steps, contact) = (smaller, steps + 1, Some(q));
     };
-    Ball { sphere: Sphere::new(p - radius * n, radius), steps, end }
+    Ball { sphere: Sphere::new(p - radius * n, radius), contact, steps, end }
 }
 
 #[cfg(test)]
 mod tests {
     use std::f64::consts::TAU;
 
-    use medial::surface::TriMesh;
+    use crate::surface::TriMesh;
     use rand::{RngExt, SeedableRng};
     use rand_pcg::Pcg64;
 
@@ -165,7 +171,7 @@ mod tests {
         let tree = PointTree::new(&positions);
         let touched = Touched::Points(&tree, &positions);
         for &p in positions.iter().step_by(17) {
-            let Ball { sphere, steps, end } = shrinking_ball(p, p, 2.0, touched);
+            let Ball { sphere, steps, end, .. } = shrinking_ball(p, p, 2.0, touched);
             assert_eq!((steps, end), (1, End::Empty));
             assert!((sphere.radius - 1.0).abs() < 1e-12 && sphere.centre.length() < 1e-12);
         }

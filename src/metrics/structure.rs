@@ -1,0 +1,892 @@
+//! The structure of a medial mesh, measured without labels: its sheet graph, and how far each part is where the
+//! surface wants it.
+//!
+//! 1. *Graph*: sheets, seams, curves and junctions ([`SheetGraph`]).
+//! 2. *Contacts* of a point: the connected parts of the surface within `(1 + CONTACT)` times its distance. One makes it a
+//!    point of a boundary, two of a sheet, three of a seam, more of a junction; one that surrounds it, of a curve (P. Giblin,
+//!    B. Kimia 2004, *A formal classification of 3D medial axis points and their local geometry*,
+//!    <https://doi.org/10.1109/TPAMI.2004.1262192>).
+//! 3. *Centrality* of a point: the ball that touches the surface where it is closest to the point is shrunk to a medial one.
+//!    The distances to the two contacts differ by 0 on the axis, and their chord is normal to a sheet.
+//! 4. *Features*: points of sharp convex edges that the boundary of the medial mesh reaches with small radii; concave
+//!    edges, which it must not reach.
+//! 5. *Completeness*: distance from the medial balls of surface points ([`shrinking_ball`]) to the medial mesh.
+//! 6. *Outside*: edges and faces that leave the solid.
+//!
+//! METHODOLOGY.md defines the numbers. All lengths are fractions of the surface's diagonal.
+
+use std::fmt;
+use std::sync::Arc;
+
+use glam::DVec4;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::MetricError;
+use super::axis_distance::{PreparedAxis, lifted, sample_segments};
+use super::hausdorff::Summary;
+use super::samples::place_on_triangles;
+use crate::Vec3;
+use crate::complex::{Incidence, MedialMesh, SheetGraph, SheetOptions, Sphere};
+use crate::geometry::DisjointSets;
+use crate::geometry::trees::in_morton_order;
+use crate::surface::{
+    End, InsideTest, Side, Touched, TriMesh, TriangleBvh, sharp_edges, shrinking_ball,
+    smooth_normals,
+};
+
+/// Excess over the least distance up to which the surface touches a ball. So two planes count as one contact if they turn
+/// by less than 28 degrees.
+pub const CONTACT: f64 = 0.03;
+
+/// Distance within which a feature is reached and a medial ball is found.
+pub const REACHED: f64 = 0.01;
+
+/// Angle, in degrees, by which the surface turns at a sharp edge.
+pub const SHARP_ANGLE: f64 = 30.0;
+
+/// Depth below which a point counts as one of the surface.
+const ON_SURFACE: f64 = 1e-3;
+
+/// Depth outside below which a point is outside by rounding.
+const ROUNDING: f64 = 1e-6;
+
+/// Samples of sheets, and of seams, boundaries and curves each; junctions at most; surface points.
+const SHEET_SAMPLES: usize = 600;
+const CURVE_SAMPLES: usize = 200;
+const SURFACE_SAMPLES: usize = 1_000;
+
+/// Samples along sharp edges: their spacing, and about how many at most.
+const FEATURE_SPACING: f64 = 0.005;
+const FEATURE_SAMPLES: f64 = 4_000.0;
+
+/// Samples that look for parts outside: their spacing, how many a side has at most, and about how many in all.
+const OUTSIDE_SPACING: f64 = 0.02;
+const OUTSIDE_SIDE: f64 = 16.0;
+const OUTSIDE_SAMPLES: f64 = 2e5;
+
+/// Areas of sheets that are listed.
+const LISTED: usize = 32;
+
+/// The structure of a medial mesh: JSON key `structure`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Structure {
+    /// Sizes of the sheet graph.
+    pub graph: GraphSizes,
+    /// Contacts at samples.
+    pub contacts: ContactTable,
+    /// How central samples are.
+    pub centrality: Centrality,
+    /// Sharp edges and corners that are reached.
+    pub features: Features,
+    /// Medial balls that are found.
+    pub completeness: Completeness,
+    /// Parts outside of the solid.
+    pub outside: Outside,
+    /// Sheets against those of the known axis, or of a reference.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub known: Option<SheetDifference>,
+}
+
+/// Sizes of a sheet graph.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GraphSizes {
+    /// Number of sheets.
+    pub sheets: u64,
+    /// Their total area.
+    pub sheet_area: f64,
+    /// Areas of the largest sheets, at most 32.
+    pub areas: Vec<f64>,
+    /// Number of pieces that are too narrow to be sheets.
+    pub small_pieces: u64,
+    /// Their area.
+    pub small_area: f64,
+    /// Closed pockets: the second Betti number beyond the cavities of the solid.
+    pub pockets: u64,
+    /// Number of seams.
+    pub seams: u64,
+    /// Their total length.
+    pub seam_length: f64,
+    /// Share of that length where exactly three sheets meet.
+    pub seams_of_three: Option<f64>,
+    /// Number of curves.
+    pub curves: u64,
+    /// Their total length.
+    pub curve_length: f64,
+    /// Number of junctions.
+    pub junctions: u64,
+    /// Length at which sheets end.
+    pub boundary_length: f64,
+}
+
+impl fmt::Display for GraphSizes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { sheets, seams, junctions, curves, pockets, small_pieces, .. } = self;
+        write!(f, "{sheets} sheets, {seams} seams, {junctions} junctions, {curves} curves")?;
+        let area =
+            100.0 * self.small_area / (self.small_area + self.sheet_area).max(f64::MIN_POSITIVE);
+        write!(f, "; {small_pieces} small pieces ({area:.1} % of the area), {pockets} pockets")
+    }
+}
+
+/// The contacts at a point inside a solid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ContactType {
+    /// One, or the point is on the surface.
+    Boundary,
+    /// Two.
+    Sheet,
+    /// Three.
+    Seam,
+    /// Four or more.
+    Junction,
+    /// One or more, of which one surrounds the point.
+    Curve,
+    /// The point is outside of the solid.
+    Outside,
+}
+
+/// How many samples of each part of a medial mesh have which contacts, in the order of [`ContactType`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ContactTable {
+    /// Where sheets end.
+    pub boundary: [u32; 6],
+    /// On sheets.
+    pub sheet: [u32; 6],
+    /// On seams.
+    pub seam: [u32; 6],
+    /// At junctions.
+    pub junction: [u32; 6],
+    /// On curves.
+    pub curve: [u32; 6],
+}
+
+impl ContactTable {
+    /// Share of the samples with the contacts of their part.
+    pub fn right(&self) -> Option<f64> {
+        let rows = [self.boundary, self.sheet, self.seam, self.junction, self.curve];
+        let right: u32 = (0..5).map(|k| rows[k][k]).sum();
+        // Curves meet sheets in points that are surrounded.
+        let right = right + self.junction[ContactType::Curve as usize];
+        share(right, rows.as_flattened().iter().sum())
+    }
+
+    /// The same of seams alone.
+    pub fn seams_right(&self) -> Option<f64> {
+        share(self.seam[ContactType::Seam as usize], self.seam.iter().sum())
+    }
+}
+
+fn share(part: u32, all: u32) -> Option<f64> {
+    (all > 0).then(|| f64::from(part) / f64::from(all))
+}
+
+/// How central samples of sheets and curves are; absent where there are none inside.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Centrality {
+    /// Mean difference of the distances to the two contacts.
+    pub mean: Option<f64>,
+    /// 95th percentile of the same.
+    pub p95: Option<f64>,
+    /// Mean angle between a sheet's normal and the chord of the contacts, in degrees.
+    pub angle_mean: Option<f64>,
+    /// 95th percentile of the same.
+    pub angle_p95: Option<f64>,
+}
+
+/// Sharp features of the surface, and the shares of them that the medial mesh reaches.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Features {
+    /// Length of the sharp convex edges.
+    pub convex_length: f64,
+    /// Share of it that is reached.
+    pub convex_reached: Option<f64>,
+    /// Length of the sharp concave edges.
+    pub concave_length: f64,
+    /// Share of it that is reached, which is an error.
+    pub concave_reached: Option<f64>,
+    /// Vertices with three or more sharp edges, all convex.
+    pub corners: u32,
+    /// Share of them that is reached.
+    pub corners_reached: Option<f64>,
+}
+
+/// Distances from the medial balls of surface points to the medial mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Completeness {
+    /// Number of balls.
+    pub balls: u32,
+    /// Share of their centres within [`REACHED`].
+    pub found: Option<f64>,
+    /// 95th percentile of the distances.
+    pub p95: Option<f64>,
+    /// 95th percentile of the difference of the radii there.
+    pub radius_p95: Option<f64>,
+}
+
+/// Parts of a medial mesh outside of the solid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Outside {
+    /// Edges that leave the solid.
+    pub edges: u64,
+    /// Their length outside.
+    pub length: f64,
+    /// Faces that leave the solid.
+    pub faces: u64,
+    /// Their area outside.
+    pub area: f64,
+    /// Largest distance from the surface of a point outside.
+    pub deepest: f64,
+}
+
+/// What the structure of all medial meshes is measured against: one surface.
+pub struct StructureSurface {
+    tree: Arc<TriangleBvh>,
+    inside: Arc<InsideTest>,
+    /// For each face those across its sides, and the corners.
+    around: Vec<[u32; 3]>,
+    corners: Vec<[Vec3; 3]>,
+    /// Samples along convex and along concave sharp edges, and their lengths.
+    edges: [(Vec<Vec3>, f64); 2],
+    convex_corners: Vec<Vec3>,
+    balls: Vec<Sphere>,
+}
+
+impl StructureSurface {
+    /// Prepares a closed surface with its tree, its inside test, and area-uniform points of it. `O(n log n)`.
+    ///
+    /// # Panics
+    /// If a face names a vertex that does not exist.
+    pub fn new(
+        surface: &TriMesh,
+        tree: Arc<TriangleBvh>,
+        inside: Arc<InsideTest>,
+        points: &[Vec3],
+    ) -> Self {
+        let corners: Vec<_> = (0..surface.faces.len()).map(|f| surface.triangle(f)).collect();
+        let flat: Vec<Vec3> =
+            corners.iter().map(|[a, b, c]| (b - a).cross(c - a).normalize_or_zero()).collect();
+        let smooth = SHARP_ANGLE.to_radians().cos();
+        let sharp = sharp_edges(surface, &flat, smooth);
+        let place = |v: u32| surface.vertices[v as usize];
+        let edges = [true, false].map(|convex| {
+            let chosen = sharp.iter().filter(|edge| edge.convex == convex);
+            let segments: Vec<_> =
+                chosen.map(|e| e.vertices.map(|v| place(v).extend(0.0))).collect();
+            let length = segments.iter().map(|[a, b]| a.distance(*b)).sum::<f64>() + 0.0;
+            let count = (length / FEATURE_SPACING).clamp(1.0, FEATURE_SAMPLES);
+            let samples = sample_segments(&segments, count as usize).into_iter();
+            (samples.map(DVec4::truncate).collect(), length)
+        });
+        let mut at = vec![[0_u32; 2]; surface.vertices.len()];
+        for edge in &sharp {
+            edge.vertices.iter().for_each(|&v| at[v as usize][usize::from(edge.convex)] += 1);
+        }
+        let is_corner = |&(_, &[concave, convex]): &(u32, &[u32; 2])| concave == 0 && convex >= 3;
+        let convex_corners = (0..).zip(&at).filter(is_corner).map(|(v, _)| place(v)).collect();
+        let normals = smooth_normals(surface, &flat, smooth);
+        let stride = points.len().div_ceil(SURFACE_SAMPLES).max(1);
+        let ball = |&p: &Vec3| {
+            let on = tree.closest(p);
+            let weights = weights(on.point, &corners[on.face as usize]);
+            let normals = normals(on.face as usize);
+            let normal = (0..3).map(|k| weights[k] * normals[k]).sum::<Vec3>().try_normalize()?;
+            let ball = shrinking_ball(on.point, normal, 0.5, Touched::Mesh(&tree));
+            let is_medial = ball.steps > 0 && ball.end != End::InFront;
+            (is_medial && ball.sphere.radius > ON_SURFACE).then_some(ball.sphere)
+        };
+        let chosen: Vec<Vec3> = points.iter().step_by(stride).copied().collect();
+        let balls = chosen.par_iter().filter_map(ball).collect();
+        Self { around: around(&surface.faces), tree, inside, corners, edges, convex_corners, balls }
+    }
+
+    /// The contacts at a point: see the head of this module. Cost that of the faces within reach.
+    pub fn contacts(&self, p: Vec3) -> ContactType {
+        let distance = self.tree.closest(p).distance;
+        if distance < ON_SURFACE {
+            return ContactType::Boundary;
+        }
+        if self.inside.side(p) != Side::Inside {
+            return ContactType::Outside;
+        }
+        let limit = (1.0 + CONTACT) * distance;
+        let mut near: Vec<(u32, Vec3)> = Vec::new();
+        self.tree.each_within(p, limit, |face, point| near.push((face, point - p)));
+        near.sort_unstable_by_key(|&(face, _)| face);
+        let mut parts = DisjointSets::singletons(near.len());
+        for (k, &(face, _)) in (0..).zip(&near) {
+            for (side, &other) in self.around[face as usize].iter().enumerate() {
+                let Ok(at) = near.binary_search_by_key(&other, |&(face, _)| face) else { continue };
+                let corners = &self.corners[face as usize];
+                let (a, b) = (corners[side], corners[(side + 1) % 3]);
+                if other > face && distance_to_segment(p, a, b) <= limit {
+                    parts.join(k, at as u32);
+                }
+            }
+        }
+        let surrounds =
+            (0..).zip(&near).any(|(k, (_, to))| near[parts.find(k) as usize].1.dot(*to) < 0.0);
+        match parts.len() {
+            _ if surrounds => ContactType::Curve,
+            1 => ContactType::Boundary,
+            2 => ContactType::Sheet,
+            3 => ContactType::Seam,
+            _ => ContactType::Junction,
+        }
+    }
+
+    /// The difference of the distances to two contacts, and the direction of their chord; `None` of a point that is not
+    /// inside.
+    fn central(&self, p: Vec3) -> Option<(f64, Vec3)> {
+        let closest = self.tree.closest(p);
+        if closest.distance < ON_SURFACE || self.inside.side(p) != Side::Inside {
+            return None;
+        }
+        let outward = (closest.point - p) / closest.distance;
+        let contact =
+            shrinking_ball(closest.point, outward, 0.5, Touched::Mesh(&self.tree)).contact?;
+        let chord = (closest.point - contact).try_normalize()?;
+        Some(((contact.distance(p) - closest.distance).abs(), chord))
+    }
+
+    /// The structure of a medial mesh in normalised units; `pockets` is its second Betti number beyond the cavities.
+    /// The samples follow the order of its spheres.
+    pub(super) fn measure(
+        &self,
+        mesh: &MedialMesh,
+        axis: &PreparedAxis,
+        pockets: u64,
+        known: Option<&MedialMesh>,
+    ) -> Structure {
+        let graph = SheetGraph::new(mesh, SheetOptions::default());
+        let ((contacts, centrality), outside) =
+            rayon::join(|| self.at_samples(mesh, &graph), || self.outside(mesh));
+        Structure {
+            contacts,
+            centrality,
+            outside,
+            features: self.features(mesh),
+            completeness: self.completeness(axis),
+            known: known.and_then(|known| sheet_difference(mesh, known).ok()),
+            graph: sizes(mesh, &graph, pockets),
+        }
+    }
+
+    fn at_samples(&self, mesh: &MedialMesh, graph: &SheetGraph) -> (ContactTable, Centrality) {
+        let on_sheets = mesh.faces.iter().zip(&graph.sheet_of_face).filter(|(_, s)| s.is_some());
+        let triangles: Vec<[Vec3; 3]> =
+            on_sheets.map(|(&face, _)| mesh.spheres_of(face).map(|s| s.centre)).collect();
+        let placed = place_on_triangles(&triangles, SHEET_SAMPLES, 0).unwrap_or_default();
+        let sheet: Vec<Vec3> = placed.iter().map(|placed| placed.on(&triangles)).collect();
+        let along = |edges: &mut dyn Iterator<Item = [u32; 2]>| -> Vec<Vec3> {
+            let segments: Vec<_> = edges.map(|edge| mesh.spheres_of(edge).map(lifted)).collect();
+            sample_segments(&segments, CURVE_SAMPLES).into_iter().map(DVec4::truncate).collect()
+        };
+        let seam = along(&mut graph.seams.iter().flat_map(|seam| seam.edges.iter().copied()));
+        let curve = along(&mut graph.curves.iter().flat_map(|curve| curve.edges.iter().copied()));
+        let boundary = along(&mut graph.boundary.iter().copied());
+        let stride = graph.junctions.len().div_ceil(CURVE_SAMPLES).max(1);
+        let junctions = graph.junctions.iter().step_by(stride);
+        let junction: Vec<Vec3> = junctions.map(|&v| mesh.spheres[v as usize].centre).collect();
+        let rows = [&boundary, &sheet, &seam, &junction, &curve].map(|points| {
+            let mut row = [0; 6];
+            let types: Vec<_> = points.par_iter().map(|&p| self.contacts(p)).collect();
+            types.into_iter().for_each(|found| row[found as usize] += 1);
+            row
+        });
+        let [boundary, sheet_row, seam, junction, curve_row] = rows;
+        let table = ContactTable { boundary, sheet: sheet_row, seam, junction, curve: curve_row };
+        let central =
+            |points: &[Vec3]| -> Vec<_> { points.par_iter().map(|&p| self.central(p)).collect() };
+        let (of_sheet, of_curve) = (central(&sheet), central(&curve));
+        let angles = placed.iter().zip(&of_sheet).filter_map(|(placed, found)| {
+            let [a, b, c] = triangles[placed.triangle];
+            let ((_, chord), normal) = ((*found)?, (b - a).cross(c - a).try_normalize()?);
+            // The arc tangent is exact where the angle is small.
+            Some(normal.cross(chord).length().atan2(normal.dot(chord).abs()).to_degrees())
+        });
+        let angles: Vec<f64> = angles.collect();
+        let differences =
+            of_sheet.iter().chain(&of_curve).flatten().map(|&(difference, _)| difference);
+        let differences: Vec<f64> = differences.collect();
+        let [mean, p95] = mean_and_p95(&differences);
+        let [angle_mean, angle_p95] = mean_and_p95(&angles);
+        (table, Centrality { mean, p95, angle_mean, angle_p95 })
+    }
+
+    fn features(&self, mesh: &MedialMesh) -> Features {
+        let reach = thin_boundary(mesh);
+        let reached = |points: &[Vec3]| {
+            let near = |p: Vec3| reach.as_ref().is_some_and(|tree| tree.any_within(p, REACHED));
+            let near = in_morton_order(points, |(): &mut (), p| near(p));
+            share(near.iter().filter(|&&near| near).count() as u32, near.len() as u32)
+        };
+        let [(convex, convex_length), (concave, concave_length)] = &self.edges;
+        Features {
+            convex_length: *convex_length,
+            convex_reached: reached(convex),
+            concave_length: *concave_length,
+            concave_reached: reached(concave),
+            corners: self.convex_corners.len() as u32,
+            corners_reached: reached(&self.convex_corners),
+        }
+    }
+
+    fn completeness(&self, axis: &PreparedAxis) -> Completeness {
+        let simplices = axis.parts.simplices();
+        let centres: Vec<Vec3> = self.balls.iter().map(|ball| ball.centre).collect();
+        let closest = axis.in_space.closest_batch(&centres);
+        let distances: Vec<f64> = closest.iter().map(|closest| closest.distance).collect();
+        let radii = self.balls.iter().zip(&closest).map(|(ball, closest)| {
+            let simplex = simplices[closest.face as usize];
+            let weights = weights(closest.point, &simplex.map(DVec4::truncate));
+            ((0..3).map(|k| weights[k] * simplex[k].w).sum::<f64>() - ball.radius).abs()
+        });
+        let [[_, p95], [_, radius_p95]] =
+            [mean_and_p95(&distances), mean_and_p95(&radii.collect::<Vec<_>>())];
+        let found = distances.iter().filter(|&&distance| distance <= REACHED).count() as u32;
+        let balls = distances.len() as u32;
+        Completeness { balls, found: share(found, balls), p95, radius_p95 }
+    }
+
+    /// By samples of every edge and face. A sample within the clearance of a sphere of the same simplex is inside.
+    fn outside(&self, mesh: &MedialMesh) -> Outside {
+        let centres: Vec<Vec3> = mesh.spheres.iter().map(|s| s.centre).collect();
+        let clearance: Vec<f64> = (self.inside.sides(&centres).into_iter())
+            .zip(self.tree.distance_batch(&centres))
+            .map(|(side, distance)| if side == Side::Inside { distance } else { -distance })
+            .collect();
+        let depth = |p: Vec3, of: &[u32]| {
+            let covers = |&v: &u32| p.distance(centres[v as usize]) < clearance[v as usize];
+            if of.iter().any(covers) || self.inside.side(p) == Side::Inside {
+                return 0.0;
+            }
+            self.tree.closest(p).distance
+        };
+        let longest = |face: &[u32; 3]| {
+            let [a, b, c] = face.map(|v| centres[v as usize]);
+            a.distance(b).max(b.distance(c)).max(c.distance(a))
+        };
+        let sides = |length: f64, spacing: f64| (length / spacing).ceil().clamp(2.0, OUTSIDE_SIDE);
+        let longest: Vec<f64> = mesh.faces.iter().map(longest).collect();
+        let mut spacing = OUTSIDE_SPACING;
+        while spacing < 1.0
+            && longest.iter().map(|&l| sides(l, spacing).powi(2)).sum::<f64>() > OUTSIDE_SAMPLES
+        {
+            spacing *= 2.0;
+        }
+        // For each simplex its samples, how many are outside, and the deepest.
+        let count = |depths: &mut dyn Iterator<Item = f64>| {
+            let (mut all, mut out, mut deepest) = (0.0, 0.0, 0.0_f64);
+            for depth in depths {
+                all += 1.0;
+                out += f64::from(u8::from(depth > ROUNDING));
+                deepest = deepest.max(depth);
+            }
+            (out / all, if deepest > ROUNDING { deepest } else { 0.0 })
+        };
+        let edges: Vec<(f64, f64)> = (mesh.edges.par_iter())
+            .map(|edge| {
+                let [a, b] = edge.map(|v| centres[v as usize]);
+                let (length, n) = (a.distance(b), sides(a.distance(b), spacing / 2.0));
+                let at = |k: u32| a.lerp(b, (f64::from(k) + 0.5) / n);
+                let (share, deepest) = count(&mut (0..n as u32).map(|k| depth(at(k), edge)));
+                (share * length, deepest)
+            })
+            .collect();
+        let faces: Vec<(f64, f64)> = (mesh.faces.par_iter().zip(&longest))
+            .map(|(face, &longest)| {
+                let [a, b, c] = face.map(|v| centres[v as usize]);
+                let n = sides(longest, spacing) as u32;
+                // The centroids of n * n equal triangles.
+                let cells = (0..n).flat_map(|i| (0..2 * (n - i) - 1).map(move |j| (i, j)));
+                let at = |(i, j): (u32, u32)| {
+                    let third = f64::from(1 + j % 2) / 3.0;
+                    let (s, t) = (f64::from(i) + third, f64::from(j / 2) + third);
+                    a + (s * (b - a) + t * (c - a)) / f64::from(n)
+                };
+                let (share, deepest) = count(&mut cells.map(|cell| depth(at(cell), face)));
+                (share * (b - a).cross(c - a).length() / 2.0, deepest)
+            })
+            .collect();
+        let leaves =
+            |all: &[(f64, f64)]| all.iter().filter(|&&(_, deepest)| deepest > 0.0).count() as u64;
+        let deepest = edges.iter().chain(&faces).map(|&(_, deepest)| deepest);
+        Outside {
+            edges: leaves(&edges),
+            length: edges.iter().map(|&(length, _)| length).sum::<f64>() + 0.0,
+            faces: leaves(&faces),
+            area: faces.iter().map(|&(area, _)| area).sum::<f64>() + 0.0,
+            deepest: deepest.fold(0.0, f64::max),
+        }
+    }
+}
+
+fn sizes(mesh: &MedialMesh, graph: &SheetGraph, pockets: u64) -> GraphSizes {
+    let seam_length: f64 = graph.seams.iter().map(|seam| seam.length).sum();
+    let of_three = graph.seams.iter().filter(|seam| seam.sheets.len() == 3);
+    let of_three: f64 = of_three.map(|seam| seam.length).sum();
+    let boundary = graph.boundary.iter().map(|&edge| {
+        let [a, b] = mesh.spheres_of(edge);
+        a.centre.distance(b.centre)
+    });
+    let positive = |sum: f64| sum + 0.0; // an empty sum is -0.0
+    GraphSizes {
+        sheets: graph.areas.len() as u64,
+        sheet_area: positive(graph.areas.iter().sum()),
+        areas: graph.areas.iter().take(LISTED).copied().collect(),
+        small_pieces: graph.small_pieces,
+        small_area: graph.small_area,
+        pockets,
+        seams: graph.seams.len() as u64,
+        seam_length: positive(seam_length),
+        seams_of_three: (seam_length > 0.0).then(|| of_three / seam_length),
+        curves: graph.curves.len() as u64,
+        curve_length: positive(graph.curves.iter().map(|curve| curve.length).sum()),
+        junctions: graph.junctions.len() as u64,
+        boundary_length: positive(boundary.sum()),
+    }
+}
+
+/// The parts of boundary edges, lone edges and isolated spheres where the radius is below [`REACHED`].
+fn thin_boundary(mesh: &MedialMesh) -> Option<TriangleBvh> {
+    let incidence = Incidence::of(mesh);
+    let ends = mesh.edges.iter().zip(incidence.faces_at()).filter(|&(_, &faces)| faces <= 1);
+    let mut thin: Vec<[Vec3; 3]> = Vec::new();
+    for (&edge, _) in ends {
+        let [a, b] = mesh.spheres_of(edge);
+        let (low, high) = if a.radius <= b.radius { (a, b) } else { (b, a) };
+        if low.radius <= REACHED {
+            let rise = high.radius - low.radius;
+            let part = if rise > 0.0 { ((REACHED - low.radius) / rise).min(1.0) } else { 1.0 };
+            let end = low.centre.lerp(high.centre, part);
+            thin.push([low.centre, end, end]);
+        }
+    }
+    let isolated = mesh.isolated().into_iter().map(|v| mesh.spheres[v as usize]);
+    thin.extend(isolated.filter(|s| s.radius <= REACHED).map(|s| [s.centre; 3]));
+    TriangleBvh::from_triangles(&thin).ok()
+}
+
+/// For each face the faces across its sides from corner `k` to `k + 1`; itself where there is none.
+fn around(faces: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    let mut sides: Vec<([u32; 2], u32)> = (0..)
+        .zip(faces.as_flattened())
+        .map(|(side, &a)| {
+            let b = faces[side as usize / 3][(side as usize + 1) % 3];
+            ([a.min(b), a.max(b)], side)
+        })
+        .collect();
+    sides.par_sort_unstable();
+    let mut around: Vec<[u32; 3]> = (0..faces.len() as u32).map(|face| [face; 3]).collect();
+    for pair in sides.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+        let [a, b] = [pair[0].1, pair[1].1];
+        around[a as usize / 3][a as usize % 3] = b / 3;
+        around[b as usize / 3][b as usize % 3] = a / 3;
+    }
+    around
+}
+
+/// Weights of the corners of a triangle, a segment or a point for a point on it.
+fn weights(p: Vec3, &[a, b, c]: &[Vec3; 3]) -> [f64; 3] {
+    let normal = (b - a).cross(c - a);
+    let squared = normal.length_squared();
+    if squared > 1e-30 * (b - a).length_squared() * (c - a).length_squared() {
+        let v = (p - a).cross(c - a).dot(normal) / squared;
+        let w = (b - a).cross(p - a).dot(normal) / squared;
+        return [1.0 - v - w, v, w];
+    }
+    // The longer of two sides holds the whole segment, if the third corner repeats another.
+    let along = |to: Vec3| (p - a).dot(to - a) / (to - a).length_squared().max(f64::MIN_POSITIVE);
+    let (v, w) = (along(b), along(c));
+    if a.distance_squared(b) >= a.distance_squared(c) {
+        [1.0 - v, v, 0.0]
+    } else {
+        [1.0 - w, 0.0, w]
+    }
+}
+
+fn distance_to_segment(p: Vec3, a: Vec3, b: Vec3) -> f64 {
+    let along = b - a;
+    let squared = along.length_squared();
+    let t = if squared > 0.0 { ((p - a).dot(along) / squared).clamp(0.0, 1.0) } else { 0.0 };
+    p.distance(a + t * along)
+}
+
+fn mean_and_p95(values: &[f64]) -> [Option<f64>; 2] {
+    let summary = Summary::new(values);
+    [summary.mean, summary.p95].map(|value| (!values.is_empty()).then_some(value))
+}
+
+// Sheets of two medial meshes against each other.
+
+/// Samples of each medial mesh.
+const MATCH_SAMPLES: usize = 4_000;
+
+/// A sheet and its partner.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SheetPair {
+    /// Areas in the first and in the second medial mesh.
+    pub areas: [f64; 2],
+    /// Share of the first sheet that is near the second one, and of the second near the first.
+    pub overlap: [f64; 2],
+}
+
+/// Sheets of two medial meshes of one solid, matched where most of each is nearest to the other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SheetDifference {
+    /// Matched sheets, the largest of the second mesh first.
+    pub matched: Vec<SheetPair>,
+    /// Areas of sheets of the first mesh without a partner, descending.
+    pub spurious: Vec<f64>,
+    /// Areas of sheets of the second mesh without a partner, descending.
+    pub missing: Vec<f64>,
+    /// Share of the first mesh's sheet area that is spurious.
+    pub spurious_share: Option<f64>,
+    /// Share of the second mesh's sheet area that is missing.
+    pub missing_share: Option<f64>,
+}
+
+/// Matches the sheets of a medial mesh to those of a reference, both in units of the solid's diagonal.
+///
+/// Samples of each sheet look for the nearest point of the other mesh, within [`REACHED`]. Two sheets match if each has more
+/// than half of its samples at the other.
+///
+/// # Errors
+/// When a mesh is empty or not valid.
+pub fn sheet_difference(
+    mesh: &MedialMesh,
+    reference: &MedialMesh,
+) -> Result<SheetDifference, MetricError> {
+    let sides = [mesh, reference]
+        .map(|mesh| Ok((PreparedAxis::new(mesh)?, SheetGraph::new(mesh, SheetOptions::default()))));
+    let [first, second]: [Result<_, MetricError>; 2] = sides;
+    let (first, second) = (first?, second?);
+    let there = partners(&first, &second);
+    let back = partners(&second, &first);
+    let (areas, known) = (&first.1.areas, &second.1.areas);
+    let mut matched = Vec::new();
+    let mut is_matched = vec![false; areas.len()];
+    let mut missing = Vec::new();
+    for (sheet, partner) in back.iter().enumerate() {
+        let mutual = partner.and_then(|(other, overlap)| {
+            let (there, over) = there[other as usize]?;
+            (there as usize == sheet).then_some((other as usize, [over, overlap]))
+        });
+        match mutual {
+            Some((other, overlap)) => {
+                is_matched[other] = true;
+                matched.push(SheetPair { areas: [areas[other], known[sheet]], overlap });
+            }
+            None => missing.push(known[sheet]),
+        }
+    }
+    let spurious: Vec<f64> = areas
+        .iter()
+        .zip(is_matched)
+        .filter(|(_, matched)| !matched)
+        .map(|(&area, _)| area)
+        .collect();
+    let share = |part: &[f64], all: &[f64]| {
+        let all: f64 = all.iter().sum();
+        (all > 0.0).then(|| (part.iter().sum::<f64>() + 0.0) / all)
+    };
+    Ok(SheetDifference {
+        spurious_share: share(&spurious, areas),
+        missing_share: share(&missing, known),
+        matched,
+        spurious,
+        missing,
+    })
+}
+
+/// For each sheet of a mesh the sheet of another that is nearest to more than half of it, and the share.
+fn partners(
+    (axis, graph): &(PreparedAxis, SheetGraph),
+    (other, other_graph): &(PreparedAxis, SheetGraph),
+) -> Vec<Option<(u32, f64)>> {
+    let triangles = axis.parts.triangles.iter().map(|t| t.map(DVec4::truncate));
+    let triangles: Vec<[Vec3; 3]> = triangles.collect();
+    let placed = place_on_triangles(&triangles, MATCH_SAMPLES, 0).unwrap_or_default();
+    let points: Vec<Vec3> = placed.iter().map(|placed| placed.on(&triangles)).collect();
+    let mut found: Vec<Vec<u32>> = vec![Vec::new(); graph.areas.len()];
+    for (placed, closest) in placed.iter().zip(other.in_space.closest_batch(&points)) {
+        let Some(sheet) = graph.sheet_of_face[placed.triangle] else { continue };
+        // Curves and isolated spheres follow the faces.
+        let there = other_graph.sheet_of_face.get(closest.face as usize).copied().flatten();
+        found[sheet as usize].push(match there {
+            Some(there) if closest.distance <= REACHED => there,
+            _ => u32::MAX,
+        });
+    }
+    let best = found.into_iter().map(|mut votes| {
+        votes.sort_unstable();
+        let most = votes.chunk_by(|a, b| a == b).max_by_key(|run| run.len())?;
+        let share = most.len() as f64 / votes.len() as f64;
+        (most[0] != u32::MAX && share > 0.5).then_some((most[0], share))
+    });
+    best.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
+    use super::*;
+    use crate::metrics::spikes::tests::box_axis;
+    use crate::surface::fixtures::cuboid;
+
+    fn half() -> Vec3 {
+        Vec3::new(1.5, 1.0, 0.5) / 14f64.sqrt()
+    }
+
+    /// The 3 by 2 by 1 box of diagonal 1.
+    fn surface() -> StructureSurface {
+        let mesh = cuboid(-half(), half());
+        let mut random = Pcg64::seed_from_u64(1);
+        let side = |k: usize, random: &mut Pcg64| {
+            let mut p = Vec3::from([0, 1, 2].map(|k| random.random_range(-1.0..1.0) * half()[k]));
+            p[k % 3] = if k < 3 { half()[k % 3] } else { -half()[k % 3] };
+            p
+        };
+        let points: Vec<Vec3> = (0..600).map(|k| side(k % 6, &mut random)).collect();
+        let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
+        StructureSurface::new(&mesh, Arc::new(tree), Arc::new(inside), &points)
+    }
+
+    fn structure(mesh: &MedialMesh) -> Structure {
+        surface().measure(mesh, &PreparedAxis::new(mesh).unwrap(), 0, Some(&box_axis()))
+    }
+
+    /// The exact axis without one of its faces.
+    fn without(face: usize) -> MedialMesh {
+        let MedialMesh { spheres, edges, mut faces, .. } = box_axis();
+        faces.remove(face);
+        let edges = edges
+            .into_iter()
+            .filter(|edge| faces.iter().any(|face| edge.iter().all(|v| face.contains(v))));
+        MedialMesh::from_simplices(spheres, edges.collect(), faces.clone()).unwrap()
+    }
+
+    #[test]
+    fn the_exact_axis_of_a_box_has_the_structure_of_the_box() {
+        let found = structure(&box_axis());
+        let graph = &found.graph;
+        assert_eq!((graph.sheets, graph.seams, graph.junctions, graph.curves), (13, 12, 4, 0));
+        assert_eq!((graph.small_pieces, graph.seams_of_three), (0, Some(1.0)));
+        // Twelve edges of the box, which the axis reaches.
+        let edges = 24.0 / 14f64.sqrt();
+        assert!((graph.boundary_length - edges).abs() < 1e-12);
+        assert!((found.features.convex_length - edges).abs() < 1e-12);
+        assert_eq!(found.features.convex_reached, Some(1.0));
+        assert_eq!((found.features.corners, found.features.corners_reached), (8, Some(1.0)));
+        assert_eq!((found.features.concave_length, found.features.concave_reached), (0.0, None));
+        assert!(found.completeness.p95.unwrap() < 1e-3, "{:?}", found.completeness);
+        assert_eq!(found.completeness.found, Some(1.0));
+        assert!(found.centrality.p95.unwrap() < 1e-4 && found.centrality.angle_p95.unwrap() < 1.0);
+        assert_eq!(found.outside, Outside::default());
+        // Next to a junction a seam has four contacts.
+        assert!(found.contacts.seams_right().unwrap() > 0.97);
+        assert!(found.contacts.right().unwrap() > 0.9, "{:?}", found.contacts);
+        let known = found.known.unwrap();
+        assert_eq!((known.matched.len(), known.missing_share), (13, Some(0.0)));
+    }
+
+    #[test]
+    fn contacts_are_counted_in_closed_form() {
+        let (surface, half) = (surface(), half());
+        let seam = Vec3::new(half.x - half.z, 0.0, 0.0);
+        let junction = Vec3::new(half.x - half.z, half.y - half.z, 0.0);
+        assert_eq!(surface.contacts(Vec3::ZERO), ContactType::Sheet);
+        assert_eq!(surface.contacts(Vec3::new(0.0, 0.0, 0.05)), ContactType::Boundary);
+        assert_eq!(surface.contacts(seam), ContactType::Seam);
+        assert_eq!(surface.contacts(junction), ContactType::Junction);
+        assert_eq!(surface.contacts(half), ContactType::Boundary);
+        assert_eq!(surface.contacts(2.0 * half), ContactType::Outside);
+    }
+
+    /// By the planes of the box, away from the margin where two distances differ by about [`CONTACT`].
+    #[test]
+    fn contacts_agree_with_the_planes_of_a_box() {
+        let (surface, half) = (surface(), half());
+        let mut random = Pcg64::seed_from_u64(2);
+        let mut checked = [0; 6];
+        for _ in 0..4_000 {
+            let p = Vec3::from([0, 1, 2].map(|k| random.random_range(-1.0..1.0) * half[k]));
+            let p = if random.random_bool(0.5) { Vec3::new(p.x, p.y, 0.0) } else { p };
+            let depths = [half - p, half + p].map(|d| d.to_array()).concat();
+            let least = depths.iter().copied().fold(f64::INFINITY, f64::min);
+            let excess: Vec<f64> = depths.iter().map(|depth| depth / least - 1.0).collect();
+            if least < 0.01 || excess.iter().any(|e| (e - CONTACT).abs() < 1e-9) {
+                continue;
+            }
+            let planes = excess.iter().filter(|&&e| e < CONTACT).count();
+            let expected = [ContactType::Boundary, ContactType::Sheet, ContactType::Seam];
+            let expected = expected.get(planes - 1).copied().unwrap_or(ContactType::Junction);
+            assert_eq!(surface.contacts(p), expected, "{p}");
+            checked[expected as usize] += 1;
+        }
+        assert!(checked[..3].iter().all(|&count| count > 20), "{checked:?}");
+    }
+
+    #[test]
+    fn off_the_axis_the_difference_is_twice_the_shift_and_a_turn_is_its_angle() {
+        let surface = surface();
+        let (difference, chord) = surface.central(Vec3::new(0.02, 0.01, 0.013)).unwrap();
+        assert!((difference - 0.026).abs() < 1e-9, "{difference}");
+        assert!(chord.z.abs() > 1.0 - 1e-9);
+        assert!(surface.central(2.0 * half()).is_none());
+    }
+
+    #[test]
+    fn a_missing_sheet_is_missed_by_the_balls_that_touch_it() {
+        // One of the triangles at the box's upright edges.
+        let axis = box_axis();
+        let upright = axis.faces.iter().position(|face| face == &[0, 4, 8]).unwrap();
+        let found = structure(&without(upright));
+        let known = found.known.unwrap();
+        assert_eq!((known.matched.len(), known.missing.len(), known.spurious.len()), (12, 1, 0));
+        assert!(found.completeness.found.unwrap() < 1.0);
+        let reached = found.features.convex_reached.unwrap();
+        // One of twelve edges, 1 of 24 units long; its ends are near others.
+        assert!((0.955..0.968).contains(&reached), "{reached}");
+        let back = sheet_difference(&axis, &without(upright)).unwrap();
+        assert_eq!((back.matched.len(), back.missing.len(), back.spurious.len()), (12, 0, 1));
+    }
+
+    #[test]
+    fn parts_outside_are_measured_in_closed_form() {
+        let half = half();
+        let at = |x: f64, y: f64| Sphere::new(Vec3::new(x, y, 0.0), 0.1);
+        let spheres =
+            vec![at(0.0, 0.0), at(half.x + 0.2, 0.0), at(half.x + 0.2, 0.1), at(0.0, 0.1)];
+        let mesh = MedialMesh::from_simplices(spheres.clone(), vec![[0, 1]], vec![]).unwrap();
+        let found = structure(&mesh).outside;
+        assert_eq!((found.edges, found.faces), (1, 0));
+        assert!((found.length - 0.2).abs() < 0.02 && found.deepest > 0.18, "{found:?}");
+        let faces = vec![[0, 1, 2], [0, 2, 3]];
+        let found = structure(&MedialMesh::from_simplices(spheres, vec![], faces).unwrap()).outside;
+        assert_eq!(found.faces, 2);
+        assert!((found.area - 0.02).abs() < 2e-3, "{found:?}");
+    }
+
+    #[test]
+    fn hostile_meshes_have_a_structure() {
+        let one = MedialMesh::from_simplices(vec![Sphere::new(Vec3::ZERO, 0.0)], vec![], vec![]);
+        let found = structure(&one.unwrap());
+        assert_eq!(
+            (found.graph.sheets, found.contacts.right(), found.centrality.p95),
+            (0, None, None)
+        );
+        let spheres = vec![Sphere::new(Vec3::ZERO, 0.1); 4];
+        let faces = vec![[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
+        let same = MedialMesh::from_simplices(spheres, vec![], faces).unwrap();
+        assert_eq!(structure(&same).graph.sheets, 0);
+        let far = vec![Sphere::new(Vec3::splat(1e9), 1.0), Sphere::new(Vec3::splat(-1e9), 0.0)];
+        let far = MedialMesh::from_simplices(far, vec![[0, 1]], vec![]).unwrap();
+        assert!(structure(&far).outside.length > 0.0);
+        assert!(sheet_difference(&MedialMesh::default(), &far).is_err());
+    }
+}
