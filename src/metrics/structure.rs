@@ -122,10 +122,10 @@ pub struct GraphSizes {
 impl fmt::Display for GraphSizes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { sheets, seams, junctions, curves, pockets, small_pieces, .. } = self;
-        write!(f, "{sheets} sheets, {seams} seams, {junctions} junctions, {curves} curves")?;
+        write!(f, "sheets {sheets}, seams {seams}, junctions {junctions}, curves {curves}")?;
         let area =
             100.0 * self.small_area / (self.small_area + self.sheet_area).max(f64::MIN_POSITIVE);
-        write!(f, "; {small_pieces} small pieces ({area:.1} % of the area), {pockets} pockets")
+        write!(f, "; small pieces {small_pieces} ({area:.1} % of the area), pockets {pockets}")
     }
 }
 
