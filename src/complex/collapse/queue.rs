@@ -61,22 +61,11 @@ impl Candidate {
     }
 }
 
-impl Prioritised for Candidate {
-    #[inline]
-    fn is_before(&self, other: &Self) -> bool {
-        Self::is_before(self, other)
-    }
-
-    fn order(&self, other: &Self) -> Ordering {
-        Self::order(self, other)
-    }
-}
-
 /// A priority queue of candidates: smallest cost first, then the second key, then the ids.
 /// Equal contents come out in the same order for any history.
 #[derive(Clone, Debug, Default)]
 pub struct CollapseQueue {
-    heap: LazyHeap<Candidate>,
+    heap: LazyHeap,
     /// Rejected candidates, in the order in which they were set aside; `None` once woken.
     parked: Vec<Option<Candidate>>,
     /// For each vertex the parked candidates that it is an obstacle of; grown on demand.
@@ -137,26 +126,12 @@ impl CollapseQueue {
     }
 }
 
-// A priority queue for items of which most are out of date before they would be popped.
-
 /// The heap is refilled with at most this many items at a time, few enough for the cache.
 const HEAP_SIZE: usize = 1 << 12;
 
 /// While a group is too large for the heap, a refill keeps its first `1 / SHARE` and splits off the
 /// rest.
 const SHARE: usize = 8;
-
-/// An item of a [`LazyHeap`]: small, cheap to copy, totally ordered.
-pub trait Prioritised: Copy {
-    /// The order in which items come out.
-    fn order(&self, other: &Self) -> Ordering;
-
-    /// Whether this item comes out before another. Override it where a shorter test will do.
-    #[inline]
-    fn is_before(&self, other: &Self) -> bool {
-        self.order(other) == Ordering::Less
-    }
-}
 
 /// A priority queue that sorts late and forgets early.
 ///
@@ -166,11 +141,11 @@ pub trait Prioritised: Copy {
 /// never sorted at all. Items that compare as equal must be identical: then the order in which
 /// items come out depends on the contents of the queue alone, not on its history.
 #[derive(Clone, Debug)]
-pub struct LazyHeap<T> {
+struct LazyHeap {
     /// A heap with four children per node, which lie side by side in memory.
-    near: Vec<T>,
+    near: Vec<Candidate>,
     /// The groups, the next one last.
-    far: Vec<Group<T>>,
+    far: Vec<Group>,
     /// Number of items in the groups.
     waiting: usize,
     /// With more items than this all outdated ones are dropped, to bound the memory.
@@ -179,21 +154,21 @@ pub struct LazyHeap<T> {
 
 /// Waiting items.
 #[derive(Clone, Debug)]
-struct Group<T> {
-    items: Vec<T>,
+struct Group {
+    items: Vec<Candidate>,
     /// Pivot: every item of this group is >= it, every item due earlier is < it.
-    from: T,
+    from: Candidate,
 }
 
-impl<T> Default for LazyHeap<T> {
+impl Default for LazyHeap {
     fn default() -> Self {
         Self { near: Vec::new(), far: Vec::new(), waiting: 0, prune_above: HEAP_SIZE }
     }
 }
 
-impl<T: Prioritised> LazyHeap<T> {
+impl LazyHeap {
     /// A queue of the given items. Cost `O(n)`.
-    pub fn from_items(items: Vec<T>) -> Self {
+    fn from_items(items: Vec<Candidate>) -> Self {
         let mut queue = Self::default();
         queue.refill(items);
         queue.note_size();
@@ -202,7 +177,7 @@ impl<T: Prioritised> LazyHeap<T> {
 
     /// Adds an item.
     #[inline]
-    pub fn push(&mut self, item: T) {
+    fn push(&mut self, item: Candidate) {
         match self.far.last() {
             // Only an item before every pivot may go into the heap, which is emptied first.
             Some(next) if !item.is_before(&next.from) => self.push_far(item),
@@ -213,7 +188,7 @@ impl<T: Prioritised> LazyHeap<T> {
         }
     }
 
-    fn push_far(&mut self, item: T) {
+    fn push_far(&mut self, item: Candidate) {
         // Pivots descend along `far`: the first group that does not start after the item is its own.
         let group = self.far.partition_point(|group| item.is_before(&group.from));
         self.far[group].items.push(item);
@@ -221,20 +196,15 @@ impl<T: Prioritised> LazyHeap<T> {
     }
 
     /// Number of items, including outdated ones that were not dropped yet.
-    pub fn len(&self) -> usize {
+    fn len(&self) -> usize {
         self.near.len() + self.waiting
-    }
-
-    /// Whether nothing is queued.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Takes the first item that is still current. An item that was outdated once must stay so.
     ///
     /// After a call the queue holds at most a constant plus three times the items that were current
     /// when outdated ones were last dropped.
-    pub fn pop(&mut self, is_current: impl Fn(&T) -> bool) -> Option<T> {
+    fn pop(&mut self, is_current: impl Fn(&Candidate) -> bool) -> Option<Candidate> {
         if self.len() > self.prune_above {
             self.drop_outdated(&is_current);
         }
@@ -252,7 +222,7 @@ impl<T: Prioritised> LazyHeap<T> {
         }
     }
 
-    fn drop_outdated(&mut self, is_current: &impl Fn(&T) -> bool) {
+    fn drop_outdated(&mut self, is_current: &impl Fn(&Candidate) -> bool) {
         // A group may become empty; its pivot still bounds later items.
         self.near.retain(is_current);
         self.heapify();
@@ -269,11 +239,11 @@ impl<T: Prioritised> LazyHeap<T> {
     }
 
     /// Fills the empty heap with the first of `items`; the others become the next groups.
-    fn refill(&mut self, mut items: Vec<T>) {
+    fn refill(&mut self, mut items: Vec<Candidate>) {
         // The latest group is split off first, so the earliest ends up last in `far`.
         while items.len() > HEAP_SIZE {
             let share = (HEAP_SIZE / 2).max(items.len() / SHARE);
-            let (_, &mut from, _) = items.select_nth_unstable_by(share, T::order);
+            let (_, &mut from, _) = items.select_nth_unstable_by(share, Candidate::order);
             let group = items.split_off(share);
             self.waiting += group.len();
             self.far.push(Group { items: group, from });
@@ -282,7 +252,7 @@ impl<T: Prioritised> LazyHeap<T> {
         self.heapify();
     }
 
-    fn pop_near(&mut self) -> Option<T> {
+    fn pop_near(&mut self) -> Option<Candidate> {
         let last = self.near.pop()?;
         let Some(first) = self.near.first().copied() else {
             return Some(last);
@@ -345,10 +315,9 @@ mod tests {
 
     use super::*;
 
-    impl Prioritised for (u32, u32) {
-        fn order(&self, other: &Self) -> Ordering {
-            self.cmp(other)
-        }
+    /// A candidate with a cost and an id.
+    fn item(cost: u32, id: u32) -> Candidate {
+        Candidate { cost: f64::from(cost), tie: 0.0, ends: [id, id], stamp: 0 }
     }
 
     /// Against a sorted set, with far more items than the heap takes at a time, most of which are
@@ -358,7 +327,8 @@ mod tests {
         let mut random = Pcg64::seed_from_u64(3);
         let items: Vec<_> = (0..40_000).map(|id| (random.random_range(0..9_000_u32), id)).collect();
         let mut expected: std::collections::BTreeSet<_> = items.iter().copied().collect();
-        let mut queue = LazyHeap::from_items(items);
+        let items = items.into_iter().map(|(cost, id)| item(cost, id));
+        let mut queue = LazyHeap::from_items(items.collect());
         let mut outdated = vec![false; 200_000];
         for id in 40_000.. {
             for _ in 0..random.random_range(0..4) {
@@ -366,31 +336,31 @@ mod tests {
                 outdated[gone] = true;
             }
             if (id as usize) < outdated.len() && random.random_bool(0.7) {
-                let item = (random.random_range(0..9_000), id);
-                expected.insert(item);
-                queue.push(item);
+                let cost = random.random_range(0..9_000);
+                expected.insert((cost, id));
+                queue.push(item(cost, id));
             }
-            let popped = queue.pop(|item| !outdated[item.1 as usize]);
+            let popped = queue.pop(|item| !outdated[item.ends[0] as usize]);
             let mut rest = std::iter::from_fn(|| expected.pop_first());
             let first = rest.find(|item| !outdated[item.1 as usize]);
-            assert_eq!(popped, first);
+            assert_eq!(popped, first.map(|(cost, id)| item(cost, id)));
             if popped.is_none() {
                 break;
             }
         }
-        assert!(queue.is_empty());
+        assert_eq!(queue.len(), 0);
     }
 
     /// Outdated items do not pile up.
     #[test]
     fn the_memory_is_bounded() {
         let mut queue = LazyHeap::default();
-        queue.push((0, 0));
+        queue.push(item(0, 0));
         for id in 0..1_000_000_u32 {
-            assert_eq!(queue.pop(|item| item.1 == id), Some((0, id)));
+            assert_eq!(queue.pop(|item| item.ends[0] == id), Some(item(0, id)));
             // Far behind current items, so that it is never popped.
-            (0..4).for_each(|extra| queue.push((1_000 + extra, id)));
-            queue.push((0, id + 1));
+            (0..4).for_each(|extra| queue.push(item(1_000 + extra, id)));
+            queue.push(item(0, id + 1));
             assert!(queue.len() < 3 * HEAP_SIZE, "{}", queue.len());
         }
     }
