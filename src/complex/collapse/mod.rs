@@ -75,8 +75,12 @@ impl CollapseComplex {
         for &v in mesh.faces.as_flattened() {
             valences[v as usize] += 1;
         }
-        let mut neighbours: Vec<_> = degrees.into_iter().map(Vec::with_capacity).collect();
-        let mut sides: Vec<_> = valences.into_iter().map(Vec::with_capacity).collect();
+        // With room to grow: most lists are extended before they are absorbed.
+        let reserved = |count: usize| count.next_power_of_two().max(4);
+        let mut neighbours: Vec<_> =
+            degrees.into_iter().map(|count| Vec::with_capacity(reserved(count))).collect();
+        let mut sides: Vec<_> =
+            valences.into_iter().map(|count| Vec::with_capacity(reserved(count))).collect();
         for &[a, b] in &mesh.edges {
             neighbours[a as usize].push(b);
             neighbours[b as usize].push(a);
