@@ -26,7 +26,7 @@ impl CollapseComplex {
     /// Unmarks the third vertices of the faces at the edge. The common neighbours that stay marked
     /// have no face with it.
     fn unmark_roots(&mut self, a: u32, b: u32) {
-        let sides = &self.sides[b as usize];
+        let sides = self.side_pool.get(self.sides[b as usize]);
         for &[p, q] in sides.iter().filter(|side| side.contains(&a)) {
             self.marks.remove(if p == a { q } else { p });
         }
@@ -51,7 +51,7 @@ impl CollapseComplex {
         self.find_shared(a, b);
         self.unmark_roots(a, b);
         let Self { marks, shared, .. } = self;
-        let around = &self.neighbours[b as usize];
+        let around = self.neighbour_pool.get(self.neighbours[b as usize]);
         let mut unreached = around.iter().filter(|&&c| marks.contains(c)).count();
         // A forest with one root per tree has as many edges as vertices that are not roots.
         if unreached != shared.len() {

@@ -30,6 +30,7 @@
 pub use hierarchy::{Hierarchy, HierarchyError, Step};
 pub use link::CollapseError;
 pub use queue::{Candidate, CollapseQueue};
+use queue::{List, Pool};
 
 use super::{MedialMesh, ZERO_LENGTH};
 use crate::Vec3;
@@ -49,8 +50,10 @@ pub struct CollapseComplex {
     spheres: Vec<Sphere>,
     alive: Vec<bool>,
     stamps: Vec<u32>,
-    neighbours: Vec<Vec<u32>>,
-    sides: Vec<Vec<[u32; 2]>>,
+    neighbours: Vec<List>,
+    neighbour_pool: Pool<u32>,
+    sides: Vec<List>,
+    side_pool: Pool<[u32; 2]>,
     marks: Marks,
     /// The sides in the links of both ends of a collapsing edge; a field to save allocations.
     shared: Vec<[u32; 2]>,
@@ -64,7 +67,8 @@ impl CollapseComplex {
     /// The complex of a mesh in canonical form. Cost `O(n)`.
     ///
     /// # Panics
-    /// If an edge or a face names a sphere that does not exist.
+    /// If an edge or a face names a sphere that does not exist, or there are more than `2^32`
+    /// incidences.
     pub fn from_mesh(mesh: &MedialMesh) -> Self {
         debug_assert_eq!(mesh.check(), Ok(()));
         let spheres = mesh.spheres.len();
@@ -75,27 +79,25 @@ impl CollapseComplex {
         for &v in mesh.faces.as_flattened() {
             valences[v as usize] += 1;
         }
-        // With room to grow: most lists are extended before they are absorbed.
-        let reserved = |count: usize| count.next_power_of_two().max(4);
-        let mut neighbours: Vec<_> =
-            degrees.into_iter().map(|count| Vec::with_capacity(reserved(count))).collect();
-        let mut sides: Vec<_> =
-            valences.into_iter().map(|count| Vec::with_capacity(reserved(count))).collect();
+        let (mut neighbour_pool, mut neighbours) = Pool::with_capacities(&degrees);
+        let (mut side_pool, mut sides) = Pool::with_capacities(&valences);
         for &[a, b] in &mesh.edges {
-            neighbours[a as usize].push(b);
-            neighbours[b as usize].push(a);
+            neighbour_pool.push(&mut neighbours[a as usize], b);
+            neighbour_pool.push(&mut neighbours[b as usize], a);
         }
         for &[a, b, c] in &mesh.faces {
-            sides[a as usize].push([b, c]);
-            sides[b as usize].push([a, c]);
-            sides[c as usize].push([a, b]);
+            side_pool.push(&mut sides[a as usize], [b, c]);
+            side_pool.push(&mut sides[b as usize], [a, c]);
+            side_pool.push(&mut sides[c as usize], [a, b]);
         }
         Self {
             spheres: mesh.spheres.clone(),
             alive: vec![true; spheres],
             stamps: vec![0; spheres],
             neighbours,
+            neighbour_pool,
             sides,
+            side_pool,
             marks: Marks::new(spheres),
             shared: Vec::new(),
             record: None,
@@ -182,13 +184,13 @@ impl CollapseComplex {
     /// The vertices that share an edge with `v`, each once, in no particular order.
     #[inline]
     pub fn neighbours(&self, v: u32) -> &[u32] {
-        &self.neighbours[v as usize]
+        self.neighbour_pool.get(self.neighbours[v as usize])
     }
 
     /// For each face of `v` its side opposite `v`, as an ascending pair, in no particular order.
     #[inline]
     pub fn opposite_sides(&self, v: u32) -> &[[u32; 2]] {
-        &self.sides[v as usize]
+        self.side_pool.get(self.sides[v as usize])
     }
 
     /// Whether `{a, b, c}` is a face. Cost: the shortest of the three links.
@@ -293,7 +295,7 @@ impl CollapseComplex {
     /// `{b, c, d}` are faces.
     fn find_shared(&mut self, a: u32, b: u32) {
         self.marks.clear();
-        for &c in &self.neighbours[a as usize] {
+        for &c in self.neighbour_pool.get(self.neighbours[a as usize]) {
             self.marks.insert(c);
         }
         let mut shared = std::mem::take(&mut self.shared);
@@ -310,24 +312,27 @@ impl CollapseComplex {
     }
 
     fn rename_in_neighbours(&mut self, kept: u32, removed: u32) {
-        let around = std::mem::take(&mut self.neighbours[removed as usize]);
-        for &v in around.iter().filter(|&&v| v != kept) {
-            self.rename_neighbour_of(v, kept, removed);
-            self.rename_sides_of(v, kept, removed);
+        // By index: the lists of other vertices change in the same pool meanwhile.
+        let around = self.neighbours[removed as usize];
+        for index in 0..around.len() {
+            let v = self.neighbour_pool.at(around, index);
+            if v != kept {
+                self.rename_neighbour_of(v, kept, removed);
+                self.rename_sides_of(v, kept, removed);
+            }
         }
-        self.neighbours[removed as usize] = around;
     }
 
     fn rename_neighbour_of(&mut self, v: u32, kept: u32, removed: u32) {
         let list = &mut self.neighbours[v as usize];
-        let position = list.iter().position(|&w| w == removed);
+        let position = self.neighbour_pool.get(*list).iter().position(|&w| w == removed);
         let position = position.expect("neighbours name each other");
         // A common neighbour names `kept` already: its two edges merge.
         if self.marks.contains(v) {
-            list.swap_remove(position);
+            self.neighbour_pool.swap_remove(list, position);
             self.edge_count -= 1;
         } else {
-            list[position] = kept;
+            self.neighbour_pool.get_mut(*list)[position] = kept;
         }
     }
 
@@ -335,7 +340,7 @@ impl CollapseComplex {
         let list = &mut self.sides[v as usize];
         let mut index = 0;
         while index < list.len() {
-            let [p, q] = list[index];
+            let [p, q] = self.side_pool.at(*list, index);
             let other = match (p == removed, q == removed) {
                 (true, _) => q,
                 (_, true) => p,
@@ -349,38 +354,44 @@ impl CollapseComplex {
             // A face with both ends vanishes; of two that merge, the one of `kept` stays.
             if other == kept || merges {
                 // `index` stays, since the last side has moved here.
-                list.swap_remove(index);
+                self.side_pool.swap_remove(list, index);
             } else {
-                list[index] = [kept.min(other), kept.max(other)];
+                self.side_pool.get_mut(*list)[index] = [kept.min(other), kept.max(other)];
                 index += 1;
             }
         }
     }
 
     fn absorb_neighbours(&mut self, kept: u32, removed: u32) {
-        let around = std::mem::take(&mut self.neighbours[removed as usize]);
-        let list = &mut self.neighbours[kept as usize];
-        let position = list.iter().position(|&w| w == removed);
-        list.swap_remove(position.expect("neighbours name each other"));
+        let [a, b] = [kept as usize, removed as usize];
+        let position = self.neighbours(kept).iter().position(|&w| w == removed);
+        let position = position.expect("neighbours name each other");
+        self.neighbour_pool.swap_remove(&mut self.neighbours[a], position);
         self.edge_count -= 1;
-        // Marked vertices are neighbours of `kept` already.
-        list.extend(around.into_iter().filter(|&v| v != kept && !self.marks.contains(v)));
+        for index in 0..self.neighbours[b].len() {
+            let v = self.neighbour_pool.at(self.neighbours[b], index);
+            // Marked vertices are neighbours of `kept` already.
+            if v != kept && !self.marks.contains(v) {
+                self.neighbour_pool.push(&mut self.neighbours[a], v);
+            }
+        }
+        self.neighbour_pool.release(&mut self.neighbours[b]);
     }
 
     fn absorb_sides(&mut self, kept: u32, removed: u32) {
-        let around = std::mem::take(&mut self.sides[removed as usize]);
-        let list = &mut self.sides[kept as usize];
+        let [a, b] = [kept as usize, removed as usize];
         let mut index = 0;
         // Faces with both ends are counted here, faces that merge in the next loop.
-        while index < list.len() {
-            if list[index].contains(&removed) {
-                list.swap_remove(index);
+        while index < self.sides[a].len() {
+            if self.side_pool.at(self.sides[a], index).contains(&removed) {
+                self.side_pool.swap_remove(&mut self.sides[a], index);
                 self.face_count -= 1;
             } else {
                 index += 1;
             }
         }
-        for side in around {
+        for index in 0..self.sides[b].len() {
+            let side = self.side_pool.at(self.sides[b], index);
             // A face with both ends: it was removed and counted above.
             if side.contains(&kept) {
                 continue;
@@ -388,9 +399,10 @@ impl CollapseComplex {
             if !self.shared.is_empty() && self.shared.binary_search(&side).is_ok() {
                 self.face_count -= 1;
             } else {
-                list.push(side);
+                self.side_pool.push(&mut self.sides[a], side);
             }
         }
+        self.side_pool.release(&mut self.sides[b]);
     }
 }
 

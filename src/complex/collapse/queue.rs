@@ -308,6 +308,129 @@ impl LazyHeap {
     }
 }
 
+// Many short lists in one allocation: the adjacency of a complex without an allocation per vertex.
+//
+// Capacities are powers of two. A list that outgrows its block moves to a block of the next class,
+// from the free list if there is one. So the memory of removed vertices is reused and the pool stays
+// bounded.
+
+/// Capacity of the smallest block.
+const SMALLEST: usize = 4;
+
+/// The place of a list in its [`Pool`].
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct List {
+    start: u32,
+    len: u32,
+    /// The block holds `SMALLEST << class` items.
+    class: u32,
+}
+
+impl List {
+    pub(super) fn len(self) -> usize {
+        self.len as usize
+    }
+}
+
+/// The storage of many lists of `T`.
+#[derive(Clone, Debug)]
+pub(super) struct Pool<T> {
+    items: Vec<T>,
+    /// Starts of the unused blocks of each class.
+    free: Vec<Vec<u32>>,
+}
+
+fn class_for(capacity: usize) -> u32 {
+    capacity.div_ceil(SMALLEST).next_power_of_two().trailing_zeros()
+}
+
+impl<T: Copy + Default> Pool<T> {
+    /// A pool with one empty list for each entry of `capacities`.
+    ///
+    /// # Panics
+    /// If the capacities add up to more than `u32::MAX` items.
+    pub(super) fn with_capacities(capacities: &[u32]) -> (Self, Vec<List>) {
+        let mut total = 0_usize;
+        let lists = capacities
+            .iter()
+            .map(|&capacity| {
+                let class = class_for(capacity as usize);
+                let start = u32::try_from(total).expect("more than 2^32 incidences");
+                total += SMALLEST << class;
+                List { start, len: 0, class }
+            })
+            .collect();
+        (Self { items: vec![T::default(); total], free: Vec::new() }, lists)
+    }
+
+    #[inline]
+    pub(super) fn get(&self, list: List) -> &[T] {
+        &self.items[list.start as usize..][..list.len as usize]
+    }
+
+    #[inline]
+    pub(super) fn get_mut(&mut self, list: List) -> &mut [T] {
+        &mut self.items[list.start as usize..][..list.len as usize]
+    }
+
+    /// The item at `index` of a list, by value, so that no borrow outlives the call.
+    #[inline]
+    pub(super) fn at(&self, list: List, index: usize) -> T {
+        self.get(list)[index]
+    }
+
+    #[inline]
+    pub(super) fn push(&mut self, list: &mut List, item: T) {
+        if list.len as usize == SMALLEST << list.class {
+            self.grow(list);
+        }
+        self.items[(list.start + list.len) as usize] = item;
+        list.len += 1;
+    }
+
+    /// Removes the item at `index`; the last one takes its place.
+    #[inline]
+    pub(super) fn swap_remove(&mut self, list: &mut List, index: usize) {
+        let items = self.get_mut(*list);
+        items[index] = items[items.len() - 1];
+        list.len -= 1;
+    }
+
+    /// Gives the block back; the list is empty and must not be used again.
+    pub(super) fn release(&mut self, list: &mut List) {
+        self.give(list.class, list.start);
+        list.len = 0;
+    }
+
+    fn grow(&mut self, list: &mut List) {
+        let (old, len) = (list.start as usize, list.len as usize);
+        // Doubling keeps the copies linear in the pushes. Take before give: the blocks must differ.
+        let class = list.class + 1;
+        let start = self.take(class);
+        self.items.copy_within(old..old + len, start as usize);
+        self.give(list.class, list.start);
+        (list.start, list.class) = (start, class);
+    }
+
+    fn take(&mut self, class: u32) -> u32 {
+        if let Some(start) = self.free.get_mut(class as usize).and_then(Vec::pop) {
+            return start;
+        }
+        let start = self.items.len();
+        let end = start + (SMALLEST << class);
+        assert!(u32::try_from(end).is_ok(), "more than 2^32 incidences");
+        self.items.resize(end, T::default());
+        start as u32
+    }
+
+    fn give(&mut self, class: u32, start: u32) {
+        if self.free.len() <= class as usize {
+            self.free.resize(class as usize + 1, Vec::new());
+        }
+        self.free[class as usize].push(start);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use rand::{RngExt, SeedableRng};
@@ -363,5 +486,43 @@ mod tests {
             queue.push(item(0, id + 1));
             assert!(queue.len() < 3 * HEAP_SIZE, "{}", queue.len());
         }
+    }
+
+    #[test]
+    fn lists_grow_past_their_blocks_and_blocks_are_used_again() {
+        let (mut pool, mut lists) = Pool::<u32>::with_capacities(&[1, 4, 5]);
+        assert_eq!(pool.items.len(), 4 + 4 + 8);
+        for round in 0..40 {
+            for (index, list) in lists.iter_mut().enumerate() {
+                pool.push(list, 1000 * index as u32 + round);
+            }
+        }
+        for (index, &list) in lists.iter().enumerate() {
+            let expected: Vec<u32> = (0..40).map(|round| 1000 * index as u32 + round).collect();
+            assert_eq!(pool.get(list), expected);
+        }
+        let before = pool.items.len();
+        let mut gone = lists[0];
+        pool.release(&mut gone);
+        let (_, mut fresh) = Pool::<u32>::with_capacities(&[0]);
+        // A list of the pool that grows from 32 to 64 takes the block that was given back.
+        fresh[0] = List { start: pool.take(3), len: 0, class: 3 };
+        for item in 0..33 {
+            pool.push(&mut fresh[0], item);
+        }
+        assert_eq!(pool.get(fresh[0]).len(), 33);
+        assert_eq!(pool.items.len(), before);
+    }
+
+    #[test]
+    fn swap_remove_moves_the_last_item() {
+        let (mut pool, mut lists) = Pool::<u32>::with_capacities(&[3]);
+        for item in 0..3 {
+            pool.push(&mut lists[0], item);
+        }
+        pool.swap_remove(&mut lists[0], 0);
+        assert_eq!(pool.get(lists[0]), [2, 1]);
+        pool.swap_remove(&mut lists[0], 1);
+        assert_eq!(pool.get(lists[0]), [2]);
     }
 }
