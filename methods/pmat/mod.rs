@@ -51,9 +51,11 @@
 #[cfg(test)]
 mod tests;
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 use std::sync::Arc;
 
-use medial::complex::collapse::{Hierarchy, LazyHeap, Prioritised, Step};
+use medial::complex::collapse::{Hierarchy, Step};
 use medial::complex::{MedialMesh, Sphere, ZERO_LENGTH};
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
@@ -200,7 +202,7 @@ const REPORT_EVERY: usize = 4096;
 const TASK: usize = 4096;
 
 /// An edge in the queue.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Candidate {
     key: Key,
     /// Ascending.
@@ -210,26 +212,6 @@ struct Candidate {
 impl Candidate {
     fn new([a, b]: [u32; 2], spheres: [Sphere; 2]) -> Self {
         Self { key: Key::of(spheres), ends: [a.min(b), a.max(b)] }
-    }
-
-    /// Key and ends as one number in the order of both.
-    #[inline]
-    fn whole(&self) -> u128 {
-        let ends = u64::from(self.ends[0]) << 32 | u64::from(self.ends[1]);
-        u128::from(self.key.0) << 64 | u128::from(ends)
-    }
-}
-
-impl Prioritised for Candidate {
-    #[inline]
-    fn order(&self, other: &Self) -> std::cmp::Ordering {
-        self.key.cmp(&other.key).then(self.ends.cmp(&other.ends))
-    }
-
-    #[inline]
-    fn is_before(&self, other: &Self) -> bool {
-        // Compared as one number, because a branch per field would be unpredictable.
-        self.whole() < other.whole()
     }
 }
 
@@ -242,18 +224,20 @@ fn contract(mesh: &MedialMesh, run: &RunContext) -> Result<Vec<Step>> {
     let spheres = &mesh.spheres;
     let total = spheres.len();
     let edges = mesh.edges.par_iter().with_min_len(TASK);
-    let candidates = edges.map(|&ends| Candidate::new(ends, ends.map(|v| spheres[v as usize])));
-    let mut queue = LazyHeap::from_items(candidates.collect());
+    let candidate = |&ends: &[u32; 2]| Candidate::new(ends, ends.map(|v| spheres[v as usize]));
+    let mut queue: BinaryHeap<_> = edges.map(|ends| Reverse(candidate(ends))).collect();
     let mut graph = Graph::new(mesh);
     let mut steps = Vec::with_capacity(total);
     let mut left = Bits::ones(total);
-    while let Some(cheapest) = queue.pop(|edge: &Candidate| edge.ends.iter().all(|&v| left.has(v)))
-    {
+    while let Some(Reverse(cheapest)) = queue.pop() {
+        if !cheapest.ends.iter().all(|&v| left.has(v)) {
+            continue;
+        }
         // Both ends are left, so their spheres, and with them the cost, are those of the queued edge.
         let [removed, kept] = absorbed_first(cheapest.ends, |v| graph.sphere(v).radius);
         let survivor = graph.sphere(kept);
         graph.absorb(removed, kept, |neighbour, sphere| {
-            queue.push(Candidate::new([kept, neighbour], [survivor, sphere]));
+            queue.push(Reverse(Candidate::new([kept, neighbour], [survivor, sphere])));
         });
         left.clear(removed);
         steps.push(Step { removed, kept, cost: cheapest.key.cost() });

@@ -379,11 +379,4 @@ proptest! {
             let _ = read(&bytes, other);
         }
     }
-
-    #[test]
-    fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
-        for format in [Format::Off, Format::Obj, Format::Ply, Format::Stl] {
-            let _ = read(&bytes, format);
-        }
-    }
 }

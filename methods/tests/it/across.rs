@@ -5,7 +5,7 @@ use medial::simplifier::{Level, RunContext, SimplifyError};
 use medial_methods::qmat::{QmatParams, TopologyFrom};
 use medial_methods::tam_heidrich::TamHeidrichParams;
 
-use crate::common::{at, built_in, default_shape, levels, params, shape, shape_of, with_threads};
+use crate::common::{built_in, default_shape, levels, params, shape, shape_of, with_threads};
 
 #[test]
 fn wrong_parameters_are_refused_by_name() {
@@ -136,32 +136,6 @@ fn topology_is_kept_at_every_level() {
                 assert_eq!(reached > count, !found.diagnostics.warnings.is_empty(), "{name}");
             }
         }
-    }
-}
-
-#[test]
-fn collapses_continue_or_start_again_and_end_with_the_initial_mesh() {
-    let shape = shape("capsule", 24);
-    let initial = shape.initial().expect("an initial medial mesh");
-    let all = initial.spheres.len();
-    for method in ["qmat", "hem", "pmat"] {
-        let counts = [200, 80, 80, 400, 2, 120];
-        for (found, count) in
-            levels(&shape, method, &[], &counts.map(Level::Spheres)).into_iter().zip(counts)
-        {
-            let mesh = found.expect("a count").mesh;
-            assert_eq!(mesh.spheres.len(), count, "{method}");
-            assert_eq!(mesh, at(&shape, method, &[], Level::Spheres(count)), "{method} at {count}");
-        }
-        for (count, warnings) in [(all, 0), (all + 1, 1)] {
-            let found = levels(&shape, method, &[], &[Level::Spheres(count)]).remove(0);
-            let found = found.expect("a count");
-            assert_eq!(found.mesh.spheres, initial.spheres, "{method}");
-            assert_eq!(found.diagnostics.warnings.len(), warnings, "{method}");
-            assert!(method != "qmat" || found.mesh == *initial);
-        }
-        let published = at(&shape, method, &[], Level::Published).spheres.len();
-        assert!((2..all).contains(&published) && (method != "qmat" || published == 100));
     }
 }
 

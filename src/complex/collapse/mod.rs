@@ -29,7 +29,7 @@
 
 pub use hierarchy::{Hierarchy, HierarchyError, Step};
 pub use link::CollapseError;
-pub use queue::{Candidate, CollapseQueue, LazyHeap, Prioritised};
+pub use queue::{Candidate, CollapseQueue};
 use queue::{List, Pool};
 
 use super::{MedialMesh, ZERO_LENGTH};

@@ -4,9 +4,6 @@ use std::cmp::Ordering;
 
 use super::CollapseComplex;
 
-/// End of a list of nodes.
-const NONE: u32 = u32::MAX;
-
 /// An edge with its cost at the time the candidate was made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
@@ -64,23 +61,15 @@ impl Candidate {
     }
 }
 
-impl Prioritised for Candidate {
-    #[inline]
-    fn is_before(&self, other: &Self) -> bool {
-        Self::is_before(self, other)
-    }
-
-    fn order(&self, other: &Self) -> Ordering {
-        Self::order(self, other)
-    }
-}
-
 /// A priority queue of candidates: smallest cost first, then the second key, then the ids.
 /// Equal contents come out in the same order for any history.
 #[derive(Clone, Debug, Default)]
 pub struct CollapseQueue {
-    heap: LazyHeap<Candidate>,
-    parked: Parked,
+    heap: LazyHeap,
+    /// Rejected candidates, in the order in which they were set aside; `None` once woken.
+    parked: Vec<Option<Candidate>>,
+    /// For each vertex the parked candidates that it is an obstacle of; grown on demand.
+    parked_at: Vec<Vec<u32>>,
 }
 
 impl CollapseQueue {
@@ -112,112 +101,30 @@ impl CollapseQueue {
     /// Sets a rejected candidate aside until [`CollapseQueue::wake`] is called for one of
     /// `obstacles`: while none of these vertices changes, it would be rejected again.
     pub fn park(&mut self, candidate: Candidate, obstacles: &[u32]) {
-        self.parked.insert(candidate, obstacles);
+        let id = self.parked.len() as u32;
+        self.parked.push(Some(candidate));
+        for &v in obstacles {
+            if self.parked_at.len() <= v as usize {
+                self.parked_at.resize(v as usize + 1, Vec::new());
+            }
+            self.parked_at[v as usize].push(id);
+        }
     }
 
     /// Queues the candidates parked at `v` that are still current. Call it for both ends of every
     /// collapsed edge.
     #[inline]
     pub fn wake(&mut self, complex: &CollapseComplex, v: u32) {
-        while let Some(candidate) = self.parked.take(v) {
-            if candidate.is_current(complex) {
-                self.push(candidate);
+        let Some(here) = self.parked_at.get_mut(v as usize) else { return };
+        for id in std::mem::take(here) {
+            // Another obstacle may have woken it.
+            let candidate = self.parked[id as usize].take();
+            if let Some(candidate) = candidate.filter(|candidate| candidate.is_current(complex)) {
+                self.heap.push(candidate);
             }
         }
     }
 }
-
-/// Rejected candidates, listed at each of their obstacles.
-#[derive(Clone, Debug, Default)]
-struct Parked {
-    /// First node of the list of each vertex, by id; grown on demand.
-    heads: Vec<u32>,
-    nodes: Slab<Node>,
-    candidates: Slab<Waiting>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    waiting: u32,
-    next: u32,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Waiting {
-    /// `None` once it was woken at one of its obstacles.
-    candidate: Option<Candidate>,
-    /// Number of obstacles whose lists still name it; at zero the slot is free.
-    lists: u32,
-}
-
-impl Parked {
-    fn insert(&mut self, candidate: Candidate, obstacles: &[u32]) {
-        let lists = obstacles.len() as u32;
-        // Nothing could ever wake it.
-        if lists == 0 {
-            return;
-        }
-        let waiting = self.candidates.insert(Waiting { candidate: Some(candidate), lists });
-        for &v in obstacles {
-            if self.heads.len() <= v as usize {
-                self.heads.resize(v as usize + 1, NONE);
-            }
-            let head = &mut self.heads[v as usize];
-            *head = self.nodes.insert(Node { waiting, next: *head });
-        }
-    }
-
-    /// A candidate of `v` that still waits, taken out of its list.
-    fn take(&mut self, v: u32) -> Option<Candidate> {
-        let head = self.heads.get_mut(v as usize)?;
-        while *head != NONE {
-            let Node { waiting, next } = self.nodes.remove(*head);
-            *head = next;
-            let entry = &mut self.candidates.items[waiting as usize];
-            // Another obstacle may have woken it; then this list still has to let go of it.
-            let candidate = entry.candidate.take();
-            entry.lists -= 1;
-            if entry.lists == 0 {
-                self.candidates.remove(waiting);
-            }
-            if candidate.is_some() {
-                return candidate;
-            }
-        }
-        None
-    }
-}
-
-/// Items with stable indices; the indices of removed items are reused.
-#[derive(Clone, Debug)]
-struct Slab<T> {
-    items: Vec<T>,
-    free: Vec<u32>,
-}
-
-impl<T> Default for Slab<T> {
-    fn default() -> Self {
-        Self { items: Vec::new(), free: Vec::new() }
-    }
-}
-
-impl<T: Copy> Slab<T> {
-    fn insert(&mut self, item: T) -> u32 {
-        if let Some(index) = self.free.pop() {
-            self.items[index as usize] = item;
-            return index;
-        }
-        self.items.push(item);
-        (self.items.len() - 1) as u32
-    }
-
-    fn remove(&mut self, index: u32) -> T {
-        self.free.push(index);
-        self.items[index as usize]
-    }
-}
-
-// A priority queue for items of which most are out of date before they would be popped.
 
 /// The heap is refilled with at most this many items at a time, few enough for the cache.
 const HEAP_SIZE: usize = 1 << 12;
@@ -225,18 +132,6 @@ const HEAP_SIZE: usize = 1 << 12;
 /// While a group is too large for the heap, a refill keeps its first `1 / SHARE` and splits off the
 /// rest.
 const SHARE: usize = 8;
-
-/// An item of a [`LazyHeap`]: small, cheap to copy, totally ordered.
-pub trait Prioritised: Copy {
-    /// The order in which items come out.
-    fn order(&self, other: &Self) -> Ordering;
-
-    /// Whether this item comes out before another. Override it where a shorter test will do.
-    #[inline]
-    fn is_before(&self, other: &Self) -> bool {
-        self.order(other) == Ordering::Less
-    }
-}
 
 /// A priority queue that sorts late and forgets early.
 ///
@@ -246,11 +141,11 @@ pub trait Prioritised: Copy {
 /// never sorted at all. Items that compare as equal must be identical: then the order in which
 /// items come out depends on the contents of the queue alone, not on its history.
 #[derive(Clone, Debug)]
-pub struct LazyHeap<T> {
+struct LazyHeap {
     /// A heap with four children per node, which lie side by side in memory.
-    near: Vec<T>,
+    near: Vec<Candidate>,
     /// The groups, the next one last.
-    far: Vec<Group<T>>,
+    far: Vec<Group>,
     /// Number of items in the groups.
     waiting: usize,
     /// With more items than this all outdated ones are dropped, to bound the memory.
@@ -259,21 +154,21 @@ pub struct LazyHeap<T> {
 
 /// Waiting items.
 #[derive(Clone, Debug)]
-struct Group<T> {
-    items: Vec<T>,
+struct Group {
+    items: Vec<Candidate>,
     /// Pivot: every item of this group is >= it, every item due earlier is < it.
-    from: T,
+    from: Candidate,
 }
 
-impl<T> Default for LazyHeap<T> {
+impl Default for LazyHeap {
     fn default() -> Self {
         Self { near: Vec::new(), far: Vec::new(), waiting: 0, prune_above: HEAP_SIZE }
     }
 }
 
-impl<T: Prioritised> LazyHeap<T> {
+impl LazyHeap {
     /// A queue of the given items. Cost `O(n)`.
-    pub fn from_items(items: Vec<T>) -> Self {
+    fn from_items(items: Vec<Candidate>) -> Self {
         let mut queue = Self::default();
         queue.refill(items);
         queue.note_size();
@@ -282,7 +177,7 @@ impl<T: Prioritised> LazyHeap<T> {
 
     /// Adds an item.
     #[inline]
-    pub fn push(&mut self, item: T) {
+    fn push(&mut self, item: Candidate) {
         match self.far.last() {
             // Only an item before every pivot may go into the heap, which is emptied first.
             Some(next) if !item.is_before(&next.from) => self.push_far(item),
@@ -293,7 +188,7 @@ impl<T: Prioritised> LazyHeap<T> {
         }
     }
 
-    fn push_far(&mut self, item: T) {
+    fn push_far(&mut self, item: Candidate) {
         // Pivots descend along `far`: the first group that does not start after the item is its own.
         let group = self.far.partition_point(|group| item.is_before(&group.from));
         self.far[group].items.push(item);
@@ -301,20 +196,15 @@ impl<T: Prioritised> LazyHeap<T> {
     }
 
     /// Number of items, including outdated ones that were not dropped yet.
-    pub fn len(&self) -> usize {
+    fn len(&self) -> usize {
         self.near.len() + self.waiting
-    }
-
-    /// Whether nothing is queued.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Takes the first item that is still current. An item that was outdated once must stay so.
     ///
     /// After a call the queue holds at most a constant plus three times the items that were current
     /// when outdated ones were last dropped.
-    pub fn pop(&mut self, is_current: impl Fn(&T) -> bool) -> Option<T> {
+    fn pop(&mut self, is_current: impl Fn(&Candidate) -> bool) -> Option<Candidate> {
         if self.len() > self.prune_above {
             self.drop_outdated(&is_current);
         }
@@ -332,7 +222,7 @@ impl<T: Prioritised> LazyHeap<T> {
         }
     }
 
-    fn drop_outdated(&mut self, is_current: &impl Fn(&T) -> bool) {
+    fn drop_outdated(&mut self, is_current: &impl Fn(&Candidate) -> bool) {
         // A group may become empty; its pivot still bounds later items.
         self.near.retain(is_current);
         self.heapify();
@@ -349,11 +239,11 @@ impl<T: Prioritised> LazyHeap<T> {
     }
 
     /// Fills the empty heap with the first of `items`; the others become the next groups.
-    fn refill(&mut self, mut items: Vec<T>) {
+    fn refill(&mut self, mut items: Vec<Candidate>) {
         // The latest group is split off first, so the earliest ends up last in `far`.
         while items.len() > HEAP_SIZE {
             let share = (HEAP_SIZE / 2).max(items.len() / SHARE);
-            let (_, &mut from, _) = items.select_nth_unstable_by(share, T::order);
+            let (_, &mut from, _) = items.select_nth_unstable_by(share, Candidate::order);
             let group = items.split_off(share);
             self.waiting += group.len();
             self.far.push(Group { items: group, from });
@@ -362,7 +252,7 @@ impl<T: Prioritised> LazyHeap<T> {
         self.heapify();
     }
 
-    fn pop_near(&mut self) -> Option<T> {
+    fn pop_near(&mut self) -> Option<Candidate> {
         let last = self.near.pop()?;
         let Some(first) = self.near.first().copied() else {
             return Some(last);
@@ -548,10 +438,9 @@ mod tests {
 
     use super::*;
 
-    impl Prioritised for (u32, u32) {
-        fn order(&self, other: &Self) -> Ordering {
-            self.cmp(other)
-        }
+    /// A candidate with a cost and an id.
+    fn item(cost: u32, id: u32) -> Candidate {
+        Candidate { cost: f64::from(cost), tie: 0.0, ends: [id, id], stamp: 0 }
     }
 
     /// Against a sorted set, with far more items than the heap takes at a time, most of which are
@@ -561,7 +450,8 @@ mod tests {
         let mut random = Pcg64::seed_from_u64(3);
         let items: Vec<_> = (0..40_000).map(|id| (random.random_range(0..9_000_u32), id)).collect();
         let mut expected: std::collections::BTreeSet<_> = items.iter().copied().collect();
-        let mut queue = LazyHeap::from_items(items);
+        let items = items.into_iter().map(|(cost, id)| item(cost, id));
+        let mut queue = LazyHeap::from_items(items.collect());
         let mut outdated = vec![false; 200_000];
         for id in 40_000.. {
             for _ in 0..random.random_range(0..4) {
@@ -569,31 +459,31 @@ mod tests {
                 outdated[gone] = true;
             }
             if (id as usize) < outdated.len() && random.random_bool(0.7) {
-                let item = (random.random_range(0..9_000), id);
-                expected.insert(item);
-                queue.push(item);
+                let cost = random.random_range(0..9_000);
+                expected.insert((cost, id));
+                queue.push(item(cost, id));
             }
-            let popped = queue.pop(|item| !outdated[item.1 as usize]);
+            let popped = queue.pop(|item| !outdated[item.ends[0] as usize]);
             let mut rest = std::iter::from_fn(|| expected.pop_first());
             let first = rest.find(|item| !outdated[item.1 as usize]);
-            assert_eq!(popped, first);
+            assert_eq!(popped, first.map(|(cost, id)| item(cost, id)));
             if popped.is_none() {
                 break;
             }
         }
-        assert!(queue.is_empty());
+        assert_eq!(queue.len(), 0);
     }
 
     /// Outdated items do not pile up.
     #[test]
     fn the_memory_is_bounded() {
         let mut queue = LazyHeap::default();
-        queue.push((0, 0));
+        queue.push(item(0, 0));
         for id in 0..1_000_000_u32 {
-            assert_eq!(queue.pop(|item| item.1 == id), Some((0, id)));
+            assert_eq!(queue.pop(|item| item.ends[0] == id), Some(item(0, id)));
             // Far behind current items, so that it is never popped.
-            (0..4).for_each(|extra| queue.push((1_000 + extra, id)));
-            queue.push((0, id + 1));
+            (0..4).for_each(|extra| queue.push(item(1_000 + extra, id)));
+            queue.push(item(0, id + 1));
             assert!(queue.len() < 3 * HEAP_SIZE, "{}", queue.len());
         }
     }

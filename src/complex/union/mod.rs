@@ -17,7 +17,7 @@
 use std::collections::HashSet;
 
 use rayon::prelude::*;
-use search::{Buried, Nearer, Part, Parts, Shape, Signed, Unsigned};
+use search::{Nearer, Part, Parts, Shape, Signed, Unsigned};
 
 use super::{ComplexError, MedialMesh};
 use crate::Vec3;
@@ -325,7 +325,7 @@ impl MedialUnion {
     /// Whether some primitive holds `p` more than `depth` below its surface; with a negative depth,
     /// whether one is nearer than that. Ends at the first that is found.
     pub fn buries(&self, p: Vec3, depth: f64) -> bool {
-        self.burier(p, depth).is_some()
+        self.parts.any_below(p, -depth).is_some()
     }
 
     /// Removes the points that some primitive [`buries`](Self::buries) deeper than `depth`. Fast if few
@@ -339,7 +339,7 @@ impl MedialUnion {
             });
             let burier = match again {
                 Some(turn) => recent[turn],
-                None => self.burier(p, depth),
+                None => self.parts.any_below(p, -depth),
             };
             if burier.is_some() {
                 recent[..=again.unwrap_or(RECENT - 1)].rotate_right(1);
@@ -347,13 +347,6 @@ impl MedialUnion {
             }
             burier.is_none()
         });
-    }
-
-    /// The place of a primitive that holds `p` more than `depth` below its surface, if there is one.
-    fn burier(&self, p: Vec3, depth: f64) -> Option<usize> {
-        let mut search = Buried { parts: &self.parts, p, limit: -depth, place: None };
-        self.parts.search(&mut search);
-        search.place
     }
 
     /// Calls `each` for all primitives nearer to `p` than `limit` by signed distance, with that

@@ -48,14 +48,23 @@ impl Parts {
 
     /// The primitive of least signed distance, if that is below a limit.
     pub fn below(&self, p: Vec3, limit: f64) -> Option<NearestPrimitive> {
+        let (place, signed) = self.search_below(p, limit, false)?;
+        Some(NearestPrimitive { signed, primitive: self.primitive(place) })
+    }
+
+    /// The place of the first primitive met whose signed distance is below a limit.
+    pub fn any_below(&self, p: Vec3, limit: f64) -> Option<usize> {
+        self.search_below(p, limit, true).map(|(place, _)| place)
+    }
+
+    fn search_below(&self, p: Vec3, limit: f64, any: bool) -> Option<(usize, f64)> {
         // Nothing is below that, and a search with it would visit all.
         if limit == f64::NEG_INFINITY {
             return None;
         }
-        let mut search = Below { parts: self, p, limit, found: None };
+        let mut search = Below { parts: self, p, limit, any, found: None };
         self.search(&mut search);
-        let found = search.found?;
-        Some(NearestPrimitive { signed: search.limit, primitive: self.primitive(found) })
+        Some((search.found?, search.limit))
     }
 
     /// Shows to a search all primitives within its limit, and some others.
@@ -258,12 +267,14 @@ impl<R: Reading> UnionSearch for Nearest<'_, R> {
     }
 }
 
-/// Search for the primitive of least signed distance below a limit.
+/// Search for the primitive of least signed distance below a limit, or for any below it.
 struct Below<'a> {
     parts: &'a Parts,
     p: Vec3,
     /// The least distance so far.
     limit: f64,
+    /// Whether the first one ends the search.
+    any: bool,
     found: Option<usize>,
 }
 
@@ -277,45 +288,17 @@ impl UnionSearch for Below<'_> {
 
     #[inline]
     fn limit(&self) -> f64 {
+        if self.any && self.found.is_some() {
+            return f64::NEG_INFINITY;
+        }
         self.limit + self.limit.abs() * ROUNDING + self.parts.slack()
     }
 
     #[inline]
     fn look(&mut self, place: usize) {
         let signed = self.parts.shape(place).signed(self.p);
-        if signed < self.limit {
+        if signed < self.limit && !(self.any && self.found.is_some()) {
             (self.limit, self.found) = (signed, Some(place));
-        }
-    }
-}
-
-/// Search for any primitive that holds the point deeply.
-pub(super) struct Buried<'a> {
-    pub parts: &'a Parts,
-    pub p: Vec3,
-    /// Minus the depth, and minus infinity once a primitive is found.
-    pub limit: f64,
-    pub place: Option<usize>,
-}
-
-impl UnionSearch for Buried<'_> {
-    const MEASURE: Measure = Measure::Signed;
-
-    #[inline]
-    fn point(&self) -> Vec3 {
-        self.p
-    }
-
-    #[inline]
-    fn limit(&self) -> f64 {
-        self.limit
-    }
-
-    #[inline]
-    fn look(&mut self, place: usize) {
-        if self.parts.shape(place).signed(self.p) < self.limit {
-            self.place = Some(place);
-            self.limit = f64::NEG_INFINITY;
         }
     }
 }
