@@ -9,6 +9,7 @@ pub const DEFINITIONS: u32 = 1;
 mod ascent;
 mod axis_distance;
 mod certificate;
+mod cover;
 mod envelope;
 mod hausdorff;
 mod judge;
@@ -22,6 +23,7 @@ mod volume;
 pub use ascent::{Peak, PeakSearch, Peaks};
 pub use axis_distance::{AxisOptions, COVERED, axis_distance};
 pub use certificate::{Certificate, FINEST, ROUNDING, Witness, WitnessSide, certify};
+pub use cover::{CoverTest, OneSided, SMALLEST};
 pub use envelope::{EnvelopeOptions, sample_envelope};
 pub use hausdorff::{DistanceOptions, MetricError, distances};
 pub use judge::{
