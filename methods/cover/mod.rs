@@ -32,8 +32,8 @@
 //! 3. *Descent*: one sphere after the other takes trial steps that lower the sum of `(f / G)^P` over all
 //!    points, with a rising power P. After each step the ball grows to a medial one.
 //! 4. *Swaps*: the sphere that matters least moves to the point with the largest gap.
-//! 5. *Points*: dense samples, and the witness of the certificate, join the points where their gaps are
-//!    large; steps 3 and 4 go on.
+//! 5. *Rounds*: the descent sees all points with a large gap, and a part of the others, selected again and
+//!    again; the witness of the certificate joins them.
 //! 6. *Proof*: the upper end of the certified interval of `G` ([`CoverTest::uncovered`]) decides the radii.
 //!
 //! The native level is the allowed error of the mood: a search over N.
@@ -42,6 +42,7 @@ mod placement;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Bound;
 use std::sync::Arc;
 
 use medial::complex::{MedialMesh, Sphere};
@@ -51,7 +52,7 @@ use medial::simplifier::{
     Diagnostics, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
     Simplified, SimplifyError,
 };
-use medial::surface::{InsideTest, TriangleBvh, sample_with_faces};
+use medial::surface::{InsideTest, TriangleBvh};
 use placement::{Gaps, Placement, Solid};
 use serde::{Deserialize, Serialize};
 
@@ -64,17 +65,25 @@ const USUAL: usize = 64;
 /// Most spheres that are placed together.
 const MOST: usize = 1_000;
 
-/// Sweeps at each power, as the exponent of 2.
-const SCHEDULE: [(u32, usize); 3] = [(3, 8), (4, 8), (5, 8)];
+/// The powers of the rounds, as exponents of 2, and of their swaps.
+const POWERS: [(u32, u32); 4] = [(3, 3), (4, 4), (5, 5), (5, 5)];
 
-/// Rounds of more points.
-const ROUNDS: usize = 3;
+/// With few spheres the last round is repeated so often, for the spheres.
+const REPEATED: usize = 96;
+const MOST_REPEATED: usize = 4;
 
-/// Dense samples of a round, for each sphere and at least.
-const DENSE: [usize; 2] = [200, 20_000];
+/// Times that a round selects points, and sweeps on each selection.
+const SWEEPS: [usize; 2] = [3, 3];
+
+/// Width of a round's certified interval of `G`, as a share of it.
+const ROUGH: f64 = 0.1;
 
 /// Width of the certified interval of `G`, as a share of it.
 const WIDTH: f64 = 0.005;
+
+/// Narrower intervals than this, in diagonals, are not worth their cost, and the first one has the other width.
+const LEAST_WIDTH: f64 = 1e-5;
+const ROUGH_FIRST: f64 = 0.01;
 
 /// Radii are smaller than the depth by this, in diagonals, so that files keep them inside.
 const WITHIN: f64 = 1e-7;
@@ -122,18 +131,13 @@ pub enum Mood {
 }
 
 impl Mood {
-    /// The share of `G` that is added to the depths.
-    fn share(self) -> f64 {
+    /// The certified error of the side, or sides, on which spheres of this mood deviate.
+    fn error(self, gap: OneSided) -> f64 {
         match self {
-            Self::Balanced => 0.5,
-            Self::Outside => 1.0,
-            Self::Inside => 0.0,
+            Self::Balanced => 0.5 * gap.upper,
+            Self::Outside => gap.upper + BEYOND,
+            Self::Inside => gap.upper + WITHIN,
         }
-    }
-
-    /// The error of the mood for a `G`.
-    fn error(self, gap: f64) -> f64 {
-        if self == Self::Balanced { 0.5 * gap } else { gap }
     }
 }
 
@@ -193,55 +197,48 @@ impl PreparedCover<'_> {
                 "no ball fits into the solid; give a surface that encloses a volume",
             ));
         }
-        let points = solid.points(count, &candidates);
-        let mut chosen = Gaps::new(&candidates, &points).start(count);
-        // With spheres to spare, the largest ones that are left.
+        let mut pool = solid.points(count, &candidates);
+        let mut chosen = Gaps::new(&candidates, &pool).start(count);
+        // With spheres to spare, the largest balls that are left.
         let spare = (0..candidates.len()).filter(|k| !chosen.contains(k));
         let spare: Vec<usize> = spare.take(count - chosen.len()).collect();
         chosen.extend(spare);
-        let balls: Vec<Sphere> = chosen.into_iter().map(|k| candidates[k]).collect();
-        if balls.len() < count {
+        if chosen.len() < count {
+            let found = chosen.len();
             diagnostics.warn(format!(
-                "{} spheres instead of {count}: the solid has no more candidates",
-                balls.len()
+                "{found} spheres instead of {count}: the solid has no more candidates"
             ));
         }
-        let mut placement = Placement::new(&solid, balls, points);
+        let mut placement =
+            Placement::new(&solid, chosen.into_iter().map(|k| candidates[k]).collect());
+        let mut best: Option<(Vec<Sphere>, f64)> = None;
         let mut swaps = 0;
-        for (squarings, sweeps) in SCHEDULE {
-            for _ in 0..sweeps {
-                placement.sweep(squarings, run)?;
+        let last = POWERS[POWERS.len() - 1];
+        let repeated = std::iter::repeat_n(last, (REPEATED / count).min(MOST_REPEATED));
+        for (power, swap_power) in POWERS.into_iter().chain(repeated) {
+            for _ in 0..SWEEPS[0] {
+                placement.focus(&pool);
+                for _ in 0..SWEEPS[1] {
+                    placement.sweep(power, run)?;
+                }
             }
-            swaps += placement.swap(&candidates, (squarings, count), run)?;
-        }
-        for round in 0..ROUNDS {
-            let dense = (DENSE[0] * count).max(DENSE[1]);
-            let samples =
-                sample_with_faces(shape.mesh(), dense, run.seed.wrapping_add(2 + round as u64));
-            let samples: Vec<_> = samples.into_iter().map(|(p, _)| p).collect();
-            let near = 0.9 * placement.worst().0;
-            let gaps = placement.gaps_of(&samples);
-            placement.extend((samples.into_iter().zip(gaps)).filter(|s| s.1 > near).map(|s| s.0));
-            let gap = self.gap(&placement.balls)?;
-            placement.extend(gap.witness);
-            for _ in 0..6 {
-                placement.sweep(5, run)?;
+            placement.focus(&pool);
+            swaps += placement.swap(&candidates, (swap_power, count), run)?;
+            placement.focus(&pool);
+            let width = (ROUGH * placement.worst().0).max(LEAST_WIDTH);
+            let gap = self.test().uncovered(&placement.balls, width).map_err(failed)?;
+            // A swap can raise the largest gap while it lowers the sum.
+            if best.as_ref().is_none_or(|&(_, least)| gap.lower < least) {
+                best = Some((placement.balls.clone(), gap.lower));
             }
-            swaps += placement.swap(&candidates, (5, count), run)?;
-            for _ in 0..6 {
-                placement.sweep(6, run)?;
-            }
+            pool.extend(gap.witness);
         }
         diagnostics.count("swaps", swaps);
-        let gap = self.gap(&placement.balls)?;
-        Ok((placement.balls, gap))
-    }
-
-    /// The certified interval of `G`.
-    fn gap(&self, balls: &[Sphere]) -> Result<OneSided> {
-        let test = self.test();
-        let rough = test.uncovered(balls, 0.01).map_err(failed)?;
-        test.uncovered(balls, (WIDTH * rough.upper).max(1e-5)).map_err(failed)
+        let balls = best.map_or_else(|| placement.balls.clone(), |(balls, _)| balls);
+        let rough = self.test().uncovered(&balls, ROUGH_FIRST).map_err(failed)?;
+        let width = (WIDTH * rough.upper).max(LEAST_WIDTH);
+        let gap = self.test().uncovered(&balls, width).map_err(failed)?;
+        Ok((balls, gap))
     }
 
     /// Step 6.
@@ -255,22 +252,70 @@ impl PreparedCover<'_> {
         let mood = self.params.mood;
         let added = match mood {
             Mood::Inside => -WITHIN,
-            _ => mood.share() * gap.upper + BEYOND,
+            Mood::Outside => gap.upper + BEYOND,
+            Mood::Balanced => 0.5 * gap.upper,
         };
-        let spheres =
-            inner.iter().map(|ball| Sphere::new(ball.centre, (ball.radius + added).max(0.0)));
+        let spheres = inner.iter().map(|ball| Sphere::new(ball.centre, ball.radius + added));
         let mesh = MedialMesh::from_simplices(spheres.collect(), vec![], vec![])?;
-        let error = mood.error(gap.upper);
+        let error = mood.error(gap);
         diagnostics.count("error_in_millionths", (1e6 * error).ceil() as usize);
         checked(level, mesh, Some(error), diagnostics)
     }
 
-    /// The level by error.
-    fn within(&self, error: f64) -> Result<Simplified> {
-        level_within("error", error, f64::MIN_POSITIVE..)?;
-        Err(SimplifyError::unsupported("later"))
+    /// The level by error: the fewest spheres that a search over their number finds within it.
+    fn within(&self, bound: f64) -> Result<Simplified> {
+        let range = (Bound::Excluded(BEYOND), Bound::Excluded(f64::INFINITY));
+        level_within("error", bound, range)?;
+        let mood = self.params.mood;
+        let allowed = if mood == Mood::Balanced { 2.0 * bound } else { bound };
+        let solid = Solid::new(self.shape, &self.tree, &self.inside, self.run.seed);
+        let candidates = solid.candidates(1);
+        let gaps = Gaps::new(&candidates, &solid.points(1, &candidates));
+        let mut count = (LEFT * gaps.needed(allowed).unwrap_or(MOST) as f64).ceil() as usize;
+        let (mut held, mut missed) = (None, 0);
+        let mut least = f64::INFINITY;
+        for trial in 0.. {
+            count = count.clamp(missed + 1, MOST);
+            let mut diagnostics = Diagnostics::default();
+            let (balls, gap) = self.placed(count, &mut diagnostics)?;
+            let (spheres, error) = (balls.len(), mood.error(gap));
+            least = least.min(error);
+            let times = (error / bound).powf(MORE);
+            if error <= bound {
+                held = Some((balls, gap, diagnostics));
+                count = (spheres as f64 * times).floor() as usize;
+                count = count.clamp(missed + 1, (spheres - 1).max(missed + 1));
+            } else {
+                missed = count;
+                count = (count as f64 * times).ceil() as usize;
+            }
+            if let Some((balls, ..)) = &held {
+                let upper = balls.len();
+                if trial >= TRIALS || upper <= missed + 1 + upper / CLOSE {
+                    break;
+                }
+                count = count.min(upper - 1);
+            } else if missed >= MOST || spheres < missed || trial > 2 * TRIALS {
+                break;
+            }
+        }
+        let Some((balls, gap, diagnostics)) = held else {
+            return Err(SimplifyError::Level(format!(
+                "no {MOST} spheres are within {bound} of the diagonal: the least error was {least:.3e}"
+            )));
+        };
+        self.finished(Level::Native(bound), &balls, gap, diagnostics)
     }
 }
+
+/// The share of the greedy choice's spheres that the search for an error begins with, and the power of the error by
+/// which it changes their number.
+const LEFT: f64 = 0.7;
+const MORE: f64 = 1.3;
+
+/// Counts that the search for an error tries, and the part of a count that it does not resolve.
+const TRIALS: usize = 6;
+const CLOSE: usize = 24;
 
 fn failed(error: MetricError) -> SimplifyError {
     SimplifyError::Failed(error.to_string())

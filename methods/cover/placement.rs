@@ -23,9 +23,9 @@ use crate::Result;
 const CANDIDATES_EACH: usize = 30;
 const CANDIDATES: [usize; 2] = [2_000, 6_000];
 
-/// Surface points of the descent for each sphere, besides the vertices, and their least and largest number.
-const POINTS_EACH: usize = 60;
-const POINTS: [usize; 2] = [5_000, 30_000];
+/// Surface points for each sphere, besides the vertices, and their least and largest number.
+const POINTS_EACH: usize = 400;
+const POINTS: [usize; 2] = [20_000, 60_000];
 
 /// Points that the greedy start covers at most.
 const GREEDY_POINTS: usize = 4_000;
@@ -37,10 +37,21 @@ const HALVINGS: usize = 9;
 const TRIALS: usize = 6;
 
 /// A step that improves is followed by one this many times as long, one that does not by the other.
-const GROWTH: [f64; 2] = [1.5, 0.6];
+const GROWTH: [f64; 2] = [1.6, 0.8];
 
-/// Shorter steps than this are not taken.
-const SHORTEST: f64 = 1e-6;
+/// The least first step of a sweep, as a share of the largest gap.
+const LEAST_STEP: f64 = 0.02;
+
+/// Points that every sweep sees, at least and for each sphere, and the share of the largest gap from which it sees
+/// all points.
+const BASE: [usize; 2] = [6_000, 80];
+const FOCUS: f64 = 0.7;
+
+/// Failed swaps after which no other is tried.
+const FAILURES: usize = 4;
+
+/// After a swap, rounds of steps, and the spheres nearest to it that take them.
+const LOCAL: [usize; 2] = [4, 10];
 
 /// An inner ball smaller than this, in diagonals, is of no use.
 const SMALLEST_BALL: f64 = 1e-6;
@@ -141,7 +152,7 @@ fn greedy_cover(rows: &[Vec<f32>], threshold: f32, most: usize) -> Option<Vec<us
     };
     let covers: Vec<Vec<u64>> = rows.par_iter().map(bits).collect();
     let mut open = vec![u64::MAX; points.div_ceil(64)];
-    if let Some(last) = open.last_mut().filter(|_| points % 64 != 0) {
+    if let Some(last) = open.last_mut().filter(|_| !points.is_multiple_of(64)) {
         *last = (1 << (points % 64)) - 1;
     }
     let gain = |cover: &[u64], open: &[u64]| -> u32 {
@@ -232,17 +243,15 @@ fn cost(gap: f64, scale: f64, squarings: u32) -> f64 {
 }
 
 impl<'a> Placement<'a> {
-    pub fn new(solid: &'a Solid<'a>, balls: Vec<Sphere>, points: Vec<Vec3>) -> Self {
-        let mut placement = Self {
+    pub fn new(solid: &'a Solid<'a>, balls: Vec<Sphere>) -> Self {
+        Self {
             solid,
             steps: balls.iter().map(|ball| 0.3 * ball.radius).collect(),
             balls,
+            points: Vec::new(),
             nearest: Vec::new(),
-            points,
             random: Pcg64::seed_from_u64(solid.seed),
-        };
-        placement.nearest = placement.points.par_iter().map(|&p| placement.nearest_to(p)).collect();
-        placement
+        }
     }
 
     fn nearest_to(&self, p: Vec3) -> Nearest {
@@ -264,17 +273,16 @@ impl<'a> Placement<'a> {
         gaps.fold((f64::NEG_INFINITY, 0), |worst, next| if next.0 > worst.0 { next } else { worst })
     }
 
-    /// More points to be covered.
-    pub fn extend(&mut self, points: impl IntoIterator<Item = Vec3>) {
-        for p in points {
-            self.nearest.push(self.nearest_to(p));
-            self.points.push(p);
-        }
-    }
-
-    /// The nearest spheres of other points.
-    pub fn gaps_of(&self, points: &[Vec3]) -> Vec<f64> {
-        points.par_iter().map(|&p| self.nearest_to(p).gap).collect()
+    /// Takes the points of a pool whose gaps matter: those above a share of the largest.
+    pub fn focus(&mut self, pool: &[Vec3]) {
+        let nearest: Vec<Nearest> = pool.par_iter().map(|&p| self.nearest_to(p)).collect();
+        let largest = nearest.iter().map(|near| near.gap).fold(0.0, f64::max);
+        let matters = |near: &Nearest| near.gap > FOCUS * largest;
+        let every = pool.len().div_ceil(BASE[0].max(BASE[1] * self.balls.len())).max(1);
+        let kept = pool.iter().zip(nearest).enumerate();
+        let kept =
+            kept.filter(|(k, (_, near))| k % every == 0 || matters(near)).map(|(_, both)| both);
+        (self.points, self.nearest) = kept.map(|(&p, near)| (p, near)).unzip();
     }
 
     fn total(&self, scale: f64, squarings: u32) -> f64 {
@@ -306,7 +314,7 @@ impl<'a> Placement<'a> {
     fn improve(&mut self, sphere: usize, scale: f64, squarings: u32) {
         let id = sphere as u32;
         let mut ball = self.balls[sphere];
-        let mut step = self.steps[sphere].max(SHORTEST);
+        let mut step = self.steps[sphere].max(LEAST_STEP / scale);
         // A gap changes by at most twice the way of the centre, so other points are out of reach.
         let reach = 4.0 * step;
         let mut near = Vec::new();
@@ -358,7 +366,7 @@ impl<'a> Placement<'a> {
             });
             step *= GROWTH[usize::from(!is_better)];
         }
-        self.steps[sphere] = step.max(SHORTEST);
+        self.steps[sphere] = step;
         if ball != self.balls[sphere] {
             self.replace(sphere, ball);
         }
@@ -381,7 +389,7 @@ impl<'a> Placement<'a> {
         (squarings, tries): (u32, usize),
         run: &RunContext,
     ) -> Result<usize> {
-        let mut swaps = 0;
+        let (mut swaps, mut failures) = (0, 0);
         if self.balls.len() < 2 {
             return Ok(0);
         }
@@ -393,8 +401,9 @@ impl<'a> Placement<'a> {
                 losses[near.sphere as usize] +=
                     cost(near.next, scale, squarings) - cost(near.gap, scale, squarings);
             }
-            let least = (0..losses.len()).min_by(|&i, &j| losses[i].total_cmp(&losses[j]));
-            let Some(least) = least else { break };
+            let mut by_loss: Vec<usize> = (0..losses.len()).collect();
+            by_loss.sort_by(|&i, &j| losses[i].total_cmp(&losses[j]));
+            let least = by_loss[failures.min(by_loss.len() - 1)];
             // The candidate that lowers the sum most around the worst point.
             let p = self.points[worst];
             let near: Vec<(Vec3, f64)> = (self.points.iter().zip(&self.nearest))
@@ -424,13 +433,18 @@ impl<'a> Placement<'a> {
                 })
                 .collect();
             order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            for _ in 0..2 {
+            for _ in 0..LOCAL[0] {
                 run.step(0, tries)?;
-                order.iter().take(10).for_each(|&(_, k)| trial.improve(k, scale, squarings));
+                order.iter().take(LOCAL[1]).for_each(|&(_, k)| trial.improve(k, scale, squarings));
             }
             if trial.total(scale, squarings) >= before {
-                break;
+                failures += 1;
+                if failures >= FAILURES {
+                    break;
+                }
+                continue;
             }
+            failures = 0;
             *self = trial;
             swaps += 1;
         }

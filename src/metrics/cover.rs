@@ -44,7 +44,7 @@ use crate::surface::{Closest, InsideTest, Side, TriangleBvh};
 pub const SMALLEST: f64 = 1e-6;
 
 /// Cubes of a round up to which a proof of zero goes on.
-const MOST_FOR_ZERO: usize = 1 << 16;
+const MOST_FOR_ZERO: usize = 1 << 19;
 
 /// Cubes of a round at most: about 1 GB.
 const MOST: usize = 1 << 22;
