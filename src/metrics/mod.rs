@@ -27,8 +27,8 @@ pub use cover::{CoverTest, OneSided, SMALLEST};
 pub use envelope::{EnvelopeOptions, sample_envelope};
 pub use hausdorff::{DistanceOptions, MetricError, distances};
 pub use judge::{
-    AxisDistances, AxisSpan, Counts, Distances, Evaluation, Judge, JudgeOptions, RatioSpikes,
-    SheetCoverage, Spikes, TriangleQuality, Truth, counts, triangle_quality,
+    AxisDistances, AxisSpan, Counts, Cover, Distances, Evaluation, Judge, JudgeOptions, MeanAndP95,
+    RatioSpikes, SheetCoverage, Spikes, TriangleQuality, Truth, counts, triangle_quality,
 };
 pub use spikes::{FIN_ANGLE, IDLE_PROTRUSION, RATIO_THRESHOLDS, SPIKE_ANGLE, spikes};
 pub use structure::{
