@@ -1,4 +1,4 @@
-//! The published simplifiers of the medial axis, one module each, and one of this project.
+//! The published simplifiers of the medial axis, one module each, and two of this project.
 //!
 //! Every method implements [`medial::simplifier::MedialSimplifier`] and knows neither the others
 //! nor the runner. [`registry`] lists them in the order of every table.
@@ -29,7 +29,7 @@ pub type Result<T, E = SimplifyError> = std::result::Result<T, E>;
 /// A method on one shape, ready for levels.
 type Prepared<'s> = Result<Box<dyn Simplification + 's>>;
 
-/// All methods, in the order of the tables. `vmas` is marked to run only when named.
+/// All methods, in the order of the tables. `vmas` and `cover` are marked to run only when named.
 pub fn registry() -> Vec<Registered> {
     let methods = vec![
         Registered::from(angle::method())

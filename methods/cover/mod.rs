@@ -68,7 +68,7 @@ const MOST: usize = 1_000;
 /// The powers of the rounds, as exponents of 2, and of their swaps.
 const POWERS: [(u32, u32); 4] = [(3, 3), (4, 4), (5, 5), (5, 5)];
 
-/// With few spheres the last round is repeated so often, for the spheres.
+/// The last round is repeated this many times over the number of spheres, within a limit: few spheres are cheap.
 const REPEATED: usize = 96;
 const MOST_REPEATED: usize = 4;
 
