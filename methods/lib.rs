@@ -1,4 +1,4 @@
-//! The published simplifiers of the medial axis, one module each, and one of this project.
+//! The published simplifiers of the medial axis, one module each, and two of this project.
 //!
 //! Every method implements [`medial::simplifier::MedialSimplifier`] and knows neither the others
 //! nor the runner. [`registry`] lists them in the order of every table.
@@ -7,6 +7,7 @@ use medial::simplifier::{Level, MedialSimplifier, Registered, Simplification, Si
 
 pub mod angle;
 pub mod aof;
+pub mod cover;
 pub mod coverage_axis;
 pub mod dey_zhao;
 pub mod hem;
@@ -28,7 +29,7 @@ pub type Result<T, E = SimplifyError> = std::result::Result<T, E>;
 /// A method on one shape, ready for levels.
 type Prepared<'s> = Result<Box<dyn Simplification + 's>>;
 
-/// All methods, in the order of the tables. `vmas` is marked to run only when named.
+/// All methods, in the order of the tables. `vmas` and `cover` are marked to run only when named.
 pub fn registry() -> Vec<Registered> {
     let methods = vec![
         Registered::from(angle::method())
@@ -115,6 +116,12 @@ pub fn registry() -> Vec<Registered> {
             "The least two-sided error with few spheres; 4 to 24 CPU seconds for each count \
                  up to 500. It keeps the topology of its start.",
         ),
+        Registered::from(cover::method())
+            .best_for(
+                "Spheres alone, as collision models and grains are made of: they contain the solid, fit \
+                 into it, or deviate least from it, with a certified bound. The result has no edges.",
+            )
+            .on_request(),
     ];
     methods
         .into_iter()
@@ -147,7 +154,7 @@ fn hash_of(module: &str) -> Option<&'static str> {
 }
 
 /// Ids from cheap to dear by the seconds of a default comparison, its measuring included.
-const CHEAP_TO_DEAR: [&str; 14] = [
+const CHEAP_TO_DEAR: [&str; 15] = [
     "initial",
     "qmat",
     "coverage-axis",
@@ -160,6 +167,7 @@ const CHEAP_TO_DEAR: [&str; 14] = [
     "aof",
     "tam-heidrich",
     "sat",
+    "cover",
     "vmas",
     "tight",
 ];

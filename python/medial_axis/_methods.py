@@ -158,6 +158,12 @@ class Tight(Options, total=False):
     rounds: int  # rounds
 
 
+class Cover(Options, total=False):
+    """Options of `cover`."""
+
+    mood: Literal["balanced", "outside", "inside"]
+
+
 class Simplify(Protocol):
     """The type of `MedialAxis.simplify`. An id that is only known at run time takes parameters in `params`."""
 
@@ -187,6 +193,8 @@ class Simplify(Protocol):
     def __call__(self, method: Literal["vmas"], **options: Unpack[Vmas]) -> MedialAxis: ...
     @overload
     def __call__(self, method: Literal["tight"] | None = None, **options: Unpack[Tight]) -> MedialAxis: ...
+    @overload
+    def __call__(self, method: Literal["cover"], **options: Unpack[Cover]) -> MedialAxis: ...
     @overload
     def __call__(self, method: type[Any], **options: Any) -> MedialAxis: ...
     @overload

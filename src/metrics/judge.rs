@@ -11,12 +11,13 @@ use super::spikes::{centres_outside, protrusion};
 use super::structure::{Structure, StructureSurface};
 use super::volume::{Sides, box_in, volume_error_in};
 use super::{
-    AxisOptions, Certificate, DistanceOptions, MetricError, VolumeOptions, certify, spikes,
-    topology_warning,
+    AxisOptions, Certificate, CoverTest, DistanceOptions, EnvelopeOptions, MetricError, OneSided,
+    ROUNDING, VolumeOptions, certify, sample_envelope, spikes, topology_warning,
 };
 use crate::Vec3;
 use crate::complex::{Incidence, MedialMesh, MedialUnion, ZERO_LENGTH, betti, euler};
-use crate::surface::{InsideTest, Side, TriMesh, TriangleBvh};
+use crate::geometry::Sphere;
+use crate::surface::{InsideTest, Side, SignedDistance, TriMesh, TriangleBvh};
 
 /// Mean error from which radii that do not fit the surface cause a warning. A result with a smaller
 /// error is right, for any radii.
@@ -130,7 +131,10 @@ impl Judge {
         );
         let ((distances, envelope), axis) = (distances?, axis.transpose()?);
         let mut warnings = self.misfits(mesh, union, &distances);
-        warnings.extend(topology_warning(betti, self.truth.betti));
+        // A list of spheres has no connectivity that could be wrong.
+        if mesh.spheres.len() == 1 || !mesh.edges.is_empty() {
+            warnings.extend(topology_warning(betti, self.truth.betti));
+        }
         let volume_error = match volume_error {
             // The surface was accepted as a solid, and all other measures are defined.
             Err(MetricError::NoVolume(volume)) => {
@@ -194,6 +198,34 @@ impl Judge {
     pub fn certify(&self, mesh: &MedialMesh, tolerance: f64) -> Result<Certificate, MetricError> {
         let (mesh, _) = self.samples()?.ordered(mesh)?;
         certify(&self.surface, &self.tree, &mesh, tolerance)
+    }
+
+    /// The one-sided errors of the spheres of a medial mesh alone, each in an interval no wider than
+    /// `tolerance`, as fractions of the diagonal.
+    ///
+    /// # Errors
+    /// As [`Judge::certify`].
+    pub fn cover(&self, spheres: &[Sphere], tolerance: f64) -> Result<Cover, MetricError> {
+        let samples = self.samples()?;
+        let test = CoverTest::new(&self.surface.vertices, &self.tree, &self.inside);
+        let (uncovered, overshoot) =
+            (test.uncovered(spheres, tolerance)?, test.overshoot(spheres, tolerance)?);
+        let mesh = MedialMesh { spheres: spheres.to_vec(), ..MedialMesh::default() };
+        let union = MedialUnion::of_spheres(spheres)?;
+        let uncovered_at = union.signed_batch(&samples.points[..samples.uniform]);
+        let options = EnvelopeOptions {
+            samples: self.options.samples,
+            burial: ROUNDING,
+            seed: self.options.seed,
+        };
+        let boundary = sample_envelope(&mesh, &union, &options)?;
+        let overshoot_at = SignedDistance::closed(&self.tree, &self.inside).batch(&boundary);
+        Ok(Cover {
+            uncovered,
+            overshoot,
+            uncovered_over_surface: MeanAndP95::of(uncovered_at),
+            overshoot_over_boundary: MeanAndP95::of(overshoot_at),
+        })
     }
 
     fn volume_error(
@@ -347,6 +379,39 @@ pub struct Evaluation {
     pub seed: u64,
     /// Remarks for the reader, such as radii that do not fit the mesh.
     pub warnings: Vec<String>,
+}
+
+/// One-sided errors of spheres alone against a solid, as fractions of the diagonal.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cover {
+    /// Largest distance from a point of the solid, boundary and interior, to the union of the balls.
+    pub uncovered: OneSided,
+    /// Largest distance from a point of the union of the balls to the solid.
+    pub overshoot: OneSided,
+    /// Distances to the union over the area of the surface; covered points count as 0.
+    pub uncovered_over_surface: MeanAndP95,
+    /// Distances to the solid over the boundary of the union; points in the solid count as 0.
+    pub overshoot_over_boundary: MeanAndP95,
+}
+
+/// Mean and 95th percentile of sampled distances.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MeanAndP95 {
+    /// The mean.
+    pub mean: f64,
+    /// The 95th percentile.
+    pub p95: f64,
+}
+
+impl MeanAndP95 {
+    /// Of signed distances, where negative ones count as 0; 0 of none.
+    fn of(mut signed: Vec<f64>) -> Self {
+        signed.iter_mut().for_each(|distance| *distance = distance.max(0.0));
+        signed.sort_unstable_by(f64::total_cmp);
+        let Some(last) = signed.len().checked_sub(1) else { return Self::default() };
+        let mean = signed.iter().sum::<f64>() / signed.len() as f64;
+        Self { mean, p95: signed[(0.95 * last as f64) as usize] }
+    }
 }
 
 /// Distances between the surface S and the boundary of the union U of the medial primitives.

@@ -9,6 +9,7 @@ pub const DEFINITIONS: u32 = 1;
 mod ascent;
 mod axis_distance;
 mod certificate;
+mod cover;
 mod envelope;
 mod hausdorff;
 mod judge;
@@ -22,11 +23,12 @@ mod volume;
 pub use ascent::{Peak, PeakSearch, Peaks};
 pub use axis_distance::{AxisOptions, COVERED, axis_distance};
 pub use certificate::{Certificate, FINEST, ROUNDING, Witness, WitnessSide, certify};
+pub use cover::{CoverTest, OneSided, SMALLEST};
 pub use envelope::{EnvelopeOptions, sample_envelope};
 pub use hausdorff::{DistanceOptions, MetricError, distances};
 pub use judge::{
-    AxisDistances, AxisSpan, Counts, Distances, Evaluation, Judge, JudgeOptions, RatioSpikes,
-    SheetCoverage, Spikes, TriangleQuality, Truth, counts, triangle_quality,
+    AxisDistances, AxisSpan, Counts, Cover, Distances, Evaluation, Judge, JudgeOptions, MeanAndP95,
+    RatioSpikes, SheetCoverage, Spikes, TriangleQuality, Truth, counts, triangle_quality,
 };
 pub use spikes::{FIN_ANGLE, IDLE_PROTRUSION, RATIO_THRESHOLDS, SPIKE_ANGLE, spikes};
 pub use structure::{

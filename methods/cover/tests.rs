@@ -1,0 +1,106 @@
+//! Proofs of the three moods, closed forms, and bad levels.
+
+use medial::Vec3;
+use medial::metrics::CoverTest;
+use medial::shape::{Shape, ShapeOptions};
+use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
+use medial::surface::{self, TriMesh};
+
+use super::{BEYOND, method};
+
+fn shape(mesh: &TriMesh) -> Shape {
+    let report = surface::validate(mesh).expect("a solid");
+    Shape::new("solid", mesh, report, ShapeOptions::default()).expect("an extent")
+}
+
+fn cuboid(half: Vec3) -> Shape {
+    let corner = |k: u32| {
+        let sign = |bit: u32| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        half * Vec3::new(sign(0), sign(1), sign(2))
+    };
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    shape(&TriMesh { vertices: (0..8).map(corner).collect(), faces })
+}
+
+fn run(shape: &Shape, mood: &str, level: Level) -> Result<Simplified, SimplifyError> {
+    let mut params = Params::none();
+    params.set("mood", mood);
+    method().prepare(shape, &params, &RunContext::default())?.at(level)
+}
+
+/// The upper ends of both certified errors.
+fn errors(shape: &Shape, result: &Simplified) -> [f64; 2] {
+    let (tree, inside) = (shape.surface_tree().expect("a tree"), shape.inside_test());
+    let test = CoverTest::new(&shape.mesh().vertices, &tree, &inside);
+    let balls = &result.mesh.spheres;
+    [test.uncovered(balls, 1e-4), test.overshoot(balls, 1e-4)].map(|e| e.expect("balls").upper)
+}
+
+#[test]
+fn one_sphere_of_a_cube() {
+    let cube = cuboid(Vec3::ONE);
+    // The diagonal is 1: half a side is 1 / sqrt 12, and the centre is best.
+    let gap = (3_f64.sqrt() - 1.0) / 12_f64.sqrt();
+    for (mood, expected) in
+        [("inside", [gap, 0.0]), ("outside", [0.0, gap]), ("balanced", [0.5 * gap, 0.5 * gap])]
+    {
+        let found = errors(&cube, &run(&cube, mood, Level::Spheres(1)).expect("a sphere"));
+        for (found, expected) in found.into_iter().zip(expected) {
+            assert!((found - expected).abs() < 2e-3, "{mood}: {found} {expected}");
+            assert!(expected > 0.0 || found == 0.0, "{mood}: {found} is no proof");
+        }
+    }
+}
+
+#[test]
+fn moods_are_proven_on_a_box_a_torus_and_a_thin_plate() {
+    let torus = medial_datasets::find("torus").expect("a built-in shape");
+    let shapes = [
+        cuboid(Vec3::new(4.0, 2.0, 1.0)),
+        shape(&torus.mesh(torus.default_resolution)),
+        cuboid(Vec3::new(1.0, 1.0, 0.004)),
+    ];
+    for (k, shape) in shapes.iter().enumerate() {
+        let mut gaps = [0.0; 2];
+        for (gap, count) in gaps.iter_mut().zip([12, 30]) {
+            let outside = run(shape, "outside", Level::Spheres(count)).expect("spheres");
+            let [uncovered, overshoot] = errors(shape, &outside);
+            assert_eq!((uncovered, outside.mesh.spheres.len()), (0.0, count), "{k}");
+            *gap = outside.native_level.expect("its error");
+            assert!(overshoot <= *gap + 2e-4, "{k}: {overshoot} {gap}");
+            let inside = run(shape, "inside", Level::Spheres(count)).expect("spheres");
+            let [uncovered, overshoot] = errors(shape, &inside);
+            assert!(overshoot == 0.0 && uncovered <= *gap + 2e-4, "{k}: {uncovered} {overshoot}");
+            let balanced = run(shape, "balanced", Level::Spheres(count)).expect("spheres");
+            let larger = errors(shape, &balanced).into_iter().fold(0.0, f64::max);
+            assert!(larger <= 0.5 * *gap + 2e-4, "{k}: {larger} {gap}");
+        }
+        assert!(gaps[1] < 0.8 * gaps[0], "{k}: {gaps:?}");
+    }
+}
+
+#[test]
+fn an_error_gives_few_spheres_within_it() {
+    let shape = cuboid(Vec3::new(4.0, 2.0, 1.0));
+    for mood in ["outside", "balanced"] {
+        let found = run(&shape, mood, Level::Native(0.04)).expect("spheres");
+        let largest = errors(&shape, &found).into_iter().fold(0.0, f64::max);
+        assert!(largest <= 0.04 + 1e-4, "{mood}: {largest}");
+        let fewer = run(&shape, mood, Level::Spheres(found.mesh.spheres.len() * 4 / 5));
+        assert!(fewer.expect("spheres").native_level > Some(0.04), "{mood}");
+    }
+}
+
+#[test]
+fn senseless_levels_are_errors() {
+    let cube = cuboid(Vec3::ONE);
+    for level in [0.0, -1.0, f64::NAN, BEYOND] {
+        let error = run(&cube, "outside", Level::Native(level)).expect_err("no level");
+        assert!(matches!(error, SimplifyError::Level(_)), "{error}");
+    }
+    let many = run(&cube, "inside", Level::Spheres(100_000)).expect_err("too many");
+    assert!(many.to_string().contains("at most 1000"), "{many}");
+    assert!(run(&cube, "sad", Level::Spheres(1)).is_err());
+}

@@ -1,0 +1,460 @@
+//! One-sided errors of a union of balls against a solid, each in a certified interval.
+//!
+//! With the solid K, bounded by a closed surface, the union U of the balls `(c_i, r_i)`, and
+//! `sigma(p) = min_i |p - c_i| - r_i`:
+//!
+//! - `uncovered` is the largest `sigma(p)` over K, boundary and interior, and 0 if it is negative: the
+//!   distance from U to the farthest point of the solid outside it;
+//! - `overshoot` is the largest distance to K over the points of U.
+//!
+//! Unlike the two sides of [`certify`](super::certify), which measure boundaries, neither counts a
+//! point that is in both, and `uncovered` sees holes of U inside the solid.
+//!
+//! Both are found by branch and bound over cubes. Each cube has the list of the balls that can matter
+//! in it, which its eighths inherit. With the centre `q` and half diagonal `h` of a cube:
+//!
+//! 1. Over a cube, the signed distance to one ball is largest at the corner farthest from its centre.
+//!    So the least of these bounds `sigma` from above, and a cube in one ball is covered.
+//! 2. A cube is outside K, or within it, if `q` is and the surface is farther away than `h`.
+//! 3. A ball with its centre at the signed distance `s` from K (negative inside) is nowhere farther
+//!    from K than `r + s`, since the distance to K is 1-Lipschitz and a ball of radius `-s` fits into K.
+//!    So balls with `r <= -s` need no search, and the others bound the overshoot in the cubes they meet.
+//! 4. Everything else is bounded by distances being 1-Lipschitz.
+//!
+//! All cubes of one size are evaluated in one round, so the result is the same for any number of
+//! threads.
+//!
+//! # Proof of zero
+//!
+//! An upper end of exactly 0 is a proof: every cube is in one ball or outside K, or every ball in K,
+//! by more than [`ROUNDING`]. Cubes are divided beyond the tolerance for it, to a half diagonal of
+//! [`SMALLEST`]: where the margin is smaller than about that, the interval ends at a positive number.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::{FINEST, MetricError, ROUNDING};
+use crate::Vec3;
+use crate::complex::UnionError;
+use crate::geometry::Sphere;
+use crate::geometry::trees::Bounds;
+use crate::surface::{Closest, InsideTest, Side, TriangleBvh};
+
+/// Half diagonal of the smallest cubes that a proof of zero divides, in diagonals of the surface.
+pub const SMALLEST: f64 = 1e-6;
+
+/// Cubes of a round up to which a proof of zero goes on.
+const MOST_FOR_ZERO: usize = 1 << 19;
+
+/// Cubes of a round at most: about 1 GB.
+const MOST: usize = 1 << 22;
+
+/// Half the diagonal of a cube of half side 1.
+const HALF_DIAGONAL: f64 = 1.732_050_807_568_877_3;
+
+/// An interval that holds the largest of some distances.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OneSided {
+    /// A lower bound: the distance at the witness, less the bound on rounding.
+    pub lower: f64,
+    /// An upper bound; 0 if it is proven that there is no such distance.
+    pub upper: f64,
+    /// A point at which the distance is `lower`, up to rounding; absent if `lower` is 0.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub witness: Option<Vec3>,
+}
+
+/// A solid that unions of balls are measured against: the tree and the inside test of one closed,
+/// outward-oriented surface with a diagonal of about 1.
+#[derive(Clone, Copy, Debug)]
+pub struct CoverTest<'a> {
+    tree: &'a TriangleBvh,
+    inside: &'a InsideTest,
+    bounds: Bounds,
+}
+
+impl<'a> CoverTest<'a> {
+    /// The solid with these vertices on its surface.
+    pub fn new(vertices: &[Vec3], tree: &'a TriangleBvh, inside: &'a InsideTest) -> Self {
+        Self { tree, inside, bounds: Bounds::of_points(vertices.iter().copied()) }
+    }
+
+    /// The largest distance from a point of the solid to the union of the balls, in an interval no
+    /// wider than `tolerance`. Both in the unit of the surface.
+    ///
+    /// The cost grows with the area where the distance is within the tolerance of its maximum.
+    ///
+    /// # Errors
+    /// A tolerance out of range or too fine; no balls, or balls that are not finite.
+    pub fn uncovered(&self, balls: &[Sphere], tolerance: f64) -> Result<OneSided, MetricError> {
+        check(balls, tolerance)?;
+        let all = (0..balls.len() as u32).collect();
+        Search::over(self.bounds, all, tolerance)
+            .run(|cube, enough| self.uncovered_in(balls, cube, enough))
+    }
+
+    /// The largest distance from a point of the union of the balls to the solid, as [`Self::uncovered`].
+    ///
+    /// # Errors
+    /// As [`Self::uncovered`].
+    pub fn overshoot(&self, balls: &[Sphere], tolerance: f64) -> Result<OneSided, MetricError> {
+        check(balls, tolerance)?;
+        let of_ball = |ball: &Sphere| {
+            let closest = self.tree.closest(ball.centre);
+            let signed = self.signed(ball.centre, &closest);
+            // Towards the closest surface point, a ball that is larger than its depth leaves the solid.
+            let outward = (closest.point - ball.centre) * signed.signum() * -1.0;
+            let tip = ball.centre + ball.radius * outward.normalize_or(Vec3::X);
+            (ball.radius + signed, self.height(tip), tip)
+        };
+        let reaches: Vec<_> = balls.par_iter().map(of_ball).collect();
+        let most: Vec<f64> = reaches.iter().map(|&(most, ..)| most).collect();
+        let all: Vec<u32> =
+            (0..balls.len() as u32).filter(|&i| most[i as usize] > -ROUNDING).collect();
+        let corners = all.iter().flat_map(|&i| {
+            let Sphere { centre, radius } = balls[i as usize];
+            [centre - radius, centre + radius]
+        });
+        let mut search = Search::over(Bounds::of_points(corners), all.clone(), tolerance);
+        for (_, height, tip) in reaches {
+            search.raise(height, tip);
+        }
+        search.run(|cube, enough| self.overshoot_in(balls, &most, cube, enough))
+    }
+
+    /// The signed distance of a point, negative in the solid, by its closest surface point.
+    fn signed(&self, p: Vec3, closest: &Closest) -> f64 {
+        match self.inside.side(p) {
+            Side::Inside => -closest.distance,
+            Side::On => 0.0,
+            Side::Outside => closest.distance,
+        }
+    }
+
+    /// The distance of a point to the solid.
+    fn height(&self, p: Vec3) -> f64 {
+        match self.inside.side(p) {
+            Side::Outside => self.tree.closest(p).distance,
+            Side::Inside | Side::On => 0.0,
+        }
+    }
+
+    fn uncovered_in(&self, balls: &[Sphere], cube: &Cube, enough: f64) -> Bound {
+        let (q, reach) = (cube.centre, cube.reach());
+        let over = |i: &u32| balls[*i as usize].signed_distance(q);
+        let signed = cube.balls.iter().map(over).fold(f64::INFINITY, f64::min);
+        let mut upper = signed + reach;
+        for &i in &cube.balls {
+            let Sphere { centre, radius } = balls[i as usize];
+            upper = upper.min(((q - centre).abs() + cube.half).length() - radius);
+        }
+        if upper <= enough {
+            return Bound::closed(upper);
+        }
+        let closest = self.tree.closest(q);
+        let is_near = closest.distance <= reach + ROUNDING;
+        let side = self.inside.side(q);
+        if side == Side::Outside && !is_near {
+            return Bound::closed(f64::NEG_INFINITY);
+        }
+        // The closest point of the surface is in the solid, and the list of balls holds around it.
+        let (reached, at) = match side {
+            Side::Outside => {
+                let least = |least: f64, &i: &u32| {
+                    least.min(balls[i as usize].signed_distance(closest.point))
+                };
+                (cube.balls.iter().fold(f64::INFINITY, least), closest.point)
+            }
+            Side::Inside | Side::On => (signed, q),
+        };
+        // No ball that is farther than this from `q` is the nearest one within `reach` of it.
+        let list = cube.balls.iter().copied().filter(|i| over(i) <= signed + 2.0 * reach);
+        Bound { reached, at, upper, balls: list.collect() }
+    }
+
+    fn overshoot_in(&self, balls: &[Sphere], most: &[f64], cube: &Cube, enough: f64) -> Bound {
+        let (q, reach) = (cube.centre, cube.reach());
+        let meets = |&i: &u32| {
+            let Sphere { centre, radius } = balls[i as usize];
+            let apart = ((q - centre).abs() - cube.half).max(Vec3::ZERO).length();
+            most[i as usize] > enough && apart <= radius + ROUNDING
+        };
+        let list: Vec<u32> = cube.balls.iter().copied().filter(meets).collect();
+        if list.is_empty() {
+            // Each ball that was dropped here is no farther away from the solid than `enough`.
+            let upper = cube.balls.iter().map(|&i| most[i as usize].min(enough));
+            return Bound::closed(upper.fold(f64::NEG_INFINITY, f64::max));
+        }
+        let closest = self.tree.closest(q);
+        let signed = self.signed(q, &closest);
+        let of_balls = list.iter().map(|&i| most[i as usize]).fold(f64::NEG_INFINITY, f64::max);
+        // Dropped balls count as `enough`.
+        let upper = of_balls.min(signed + reach).max(enough.min(signed + reach));
+        if upper <= enough {
+            return Bound::closed(upper);
+        }
+        // A point of the union near the centre of the cube.
+        let depth = |i: &&u32| balls[**i as usize].signed_distance(q);
+        let deepest = list.iter().min_by(|i, j| depth(i).total_cmp(&depth(j)));
+        let outside = deepest.map(|&i| balls[i as usize]).filter(|b| b.signed_distance(q) > 0.0);
+        let (reached, at) = match outside {
+            None => (signed, q),
+            Some(Sphere { centre, radius }) => {
+                let at = centre + radius * (q - centre).normalize_or(Vec3::X);
+                (self.height(at), at)
+            }
+        };
+        Bound { reached, at, upper, balls: list }
+    }
+}
+
+/// # Errors
+/// When there are no balls, one is not finite, or the tolerance is out of range.
+fn check(balls: &[Sphere], tolerance: f64) -> Result<(), MetricError> {
+    if !(FINEST..=1.0).contains(&tolerance) {
+        return Err(MetricError::Tolerance(tolerance));
+    }
+    // The union reports what is wrong with them.
+    crate::complex::MedialUnion::of_spheres(balls)
+        .map(drop)
+        .map_err(|error: UnionError| error.into())
+}
+
+/// A cube, and the balls that can matter in it.
+struct Cube {
+    centre: Vec3,
+    /// Half of its side.
+    half: f64,
+    balls: Vec<u32>,
+}
+
+impl Cube {
+    /// Half of its diagonal.
+    fn reach(&self) -> f64 {
+        HALF_DIAGONAL * self.half
+    }
+}
+
+/// Bounds of the largest distance in a cube.
+struct Bound {
+    /// A distance that is reached at `at`.
+    reached: f64,
+    at: Vec3,
+    upper: f64,
+    /// The balls that matter in its eighths.
+    balls: Vec<u32>,
+}
+
+impl Bound {
+    /// Of a cube that is not divided.
+    fn closed(upper: f64) -> Self {
+        Self { reached: f64::NEG_INFINITY, at: Vec3::ZERO, upper, balls: Vec::new() }
+    }
+}
+
+/// The state of the branch and bound.
+struct Search {
+    cubes: Vec<Cube>,
+    lower: f64,
+    witness: Option<Vec3>,
+    tolerance: f64,
+}
+
+impl Search {
+    fn over(bounds: Bounds, balls: Vec<u32>, tolerance: f64) -> Self {
+        let mut cubes = Vec::new();
+        if !balls.is_empty() {
+            let half = 0.5 * (bounds.hi - bounds.lo).max_element();
+            let centre = 0.5 * (bounds.lo + bounds.hi);
+            cubes.push(Cube { centre, half: half * (1.0 + 1e-9), balls });
+        }
+        Self { cubes, lower: 0.0, witness: None, tolerance }
+    }
+
+    /// Takes a distance that is reached at a point.
+    fn raise(&mut self, reached: f64, at: Vec3) {
+        if reached - ROUNDING > self.lower {
+            (self.lower, self.witness) = (reached - ROUNDING, Some(at));
+        }
+    }
+
+    fn run(mut self, bound: impl Fn(&Cube, f64) -> Bound + Sync) -> Result<OneSided, MetricError> {
+        // Both ends are widened by ROUNDING, and half of one more covers the rounding of these sums.
+        let goal = self.tolerance - 2.5 * ROUNDING;
+        let mut upper = f64::NEG_INFINITY;
+        let mut cubes = std::mem::take(&mut self.cubes);
+        // Once given up, a proof of zero is not resumed: `upper` is positive by then.
+        let mut proves = true;
+        while let Some(first) = cubes.first() {
+            proves &= self.lower == 0.0 && cubes.len() <= MOST_FOR_ZERO && first.reach() > SMALLEST;
+            let now = if proves { -ROUNDING } else { self.lower + goal };
+            let bounds: Vec<Bound> =
+                cubes.par_iter().with_min_len(16).map(|cube| bound(cube, now)).collect();
+            // In the order of the cubes, and only now: `lower` must not depend on threads.
+            for bound in &bounds {
+                self.raise(bound.reached, bound.at);
+            }
+            let now = if self.lower > 0.0 { self.lower + goal } else { now };
+            let mut eighths = Vec::new();
+            for (cube, bound) in cubes.iter().zip(bounds) {
+                if bound.upper <= now {
+                    upper = upper.max(bound.upper);
+                    continue;
+                }
+                let half = 0.5 * cube.half;
+                for octant in 0..8_u32 {
+                    let sign = |bit: u32| if octant >> bit & 1 == 1 { half } else { -half };
+                    let centre = cube.centre + Vec3::new(sign(0), sign(1), sign(2));
+                    eighths.push(Cube { centre, half, balls: bound.balls.clone() });
+                }
+                if eighths.len() > MOST {
+                    return Err(MetricError::TooFine { tolerance: self.tolerance, pieces: MOST });
+                }
+            }
+            cubes = eighths;
+        }
+        let upper = if upper <= -ROUNDING { 0.0 } else { upper.max(self.lower) + ROUNDING };
+        Ok(OneSided { lower: self.lower, upper, witness: self.witness })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
+    use super::*;
+    use crate::surface::TriMesh;
+
+    const TOLERANCE: f64 = 1e-3;
+
+    /// The sides of a box with these half sizes, outward, or inward for a cavity.
+    fn sides(half: Vec3, shift: Vec3, is_cavity: bool, mesh: &mut TriMesh) {
+        let first = mesh.vertices.len() as u32;
+        mesh.vertices.extend((0..8_u32).map(|k| {
+            let sign = |bit: u32| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            shift + half * Vec3::new(sign(0), sign(1), sign(2))
+        }));
+        let quads =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
+        mesh.faces.extend(faces.map(|face: [u32; 3]| {
+            let [a, b, c] = face.map(|v| first + v);
+            if is_cavity { [a, c, b] } else { [a, b, c] }
+        }));
+    }
+
+    fn cube(half: f64) -> TriMesh {
+        let mut mesh = TriMesh::default();
+        sides(Vec3::splat(half), Vec3::ZERO, false, &mut mesh);
+        mesh
+    }
+
+    /// Both errors, of which each interval is no wider than the tolerance.
+    fn errors(mesh: &TriMesh, balls: &[Sphere], tolerance: f64) -> [OneSided; 2] {
+        let (tree, inside) = (TriangleBvh::new(mesh).unwrap(), InsideTest::new(mesh));
+        let test = CoverTest::new(&mesh.vertices, &tree, &inside);
+        let both = [test.uncovered(balls, tolerance), test.overshoot(balls, tolerance)];
+        both.map(|interval| {
+            let interval = interval.unwrap();
+            assert!(interval.lower <= interval.upper, "{interval:?}");
+            assert!(interval.upper - interval.lower <= tolerance, "{interval:?}");
+            assert_eq!(interval.witness.is_some(), interval.lower > 0.0);
+            interval
+        })
+    }
+
+    #[track_caller]
+    fn holds(interval: OneSided, value: f64) {
+        let OneSided { lower, upper, .. } = interval;
+        assert!(lower <= value + 1e-12 && value <= upper + 1e-12, "{value} in {interval:?}");
+    }
+
+    #[test]
+    fn one_ball_around_or_in_a_cube() {
+        let (half, corner) = (0.25, 0.25 * 3_f64.sqrt());
+        for radius in [0.1, 0.25, 0.3, corner - 1e-4, corner + 1e-4, 0.6] {
+            let balls = [Sphere::new(Vec3::ZERO, radius)];
+            let [uncovered, overshoot] = errors(&cube(half), &balls, TOLERANCE);
+            holds(uncovered, (corner - radius).max(0.0));
+            holds(overshoot, (radius - half).max(0.0));
+            assert_eq!(uncovered.upper == 0.0, radius > corner, "{radius} {uncovered:?}");
+            assert_eq!(overshoot.upper == 0.0, radius < half, "{radius} {overshoot:?}");
+        }
+    }
+
+    #[test]
+    fn a_hole_inside_the_solid_is_uncovered() {
+        let mesh = cube(0.25);
+        // They cover all sides, whose centres are at the distance 0.25 * sqrt 2, not the centre.
+        let balls: Vec<_> = mesh.vertices.iter().map(|&v| Sphere::new(v, 0.375)).collect();
+        let [uncovered, overshoot] = errors(&mesh, &balls, TOLERANCE);
+        holds(uncovered, 0.25 * 3_f64.sqrt() - 0.375);
+        holds(overshoot, 0.375);
+        let witness = uncovered.witness.unwrap();
+        assert!(witness.length() < 0.01, "{witness}");
+    }
+
+    #[test]
+    fn a_ball_in_a_cavity_is_farthest_from_the_solid_at_its_centre() {
+        let mut mesh = cube(0.25);
+        sides(Vec3::splat(0.125), Vec3::ZERO, true, &mut mesh);
+        for radius in [0.05, 0.2] {
+            let balls = [Sphere::new(Vec3::ZERO, radius)];
+            holds(errors(&mesh, &balls, TOLERANCE)[1], 0.125);
+        }
+        // Outside the solid alone: the union covers nothing.
+        let balls = [Sphere::new(Vec3::new(0.75, 0.0, 0.0), 0.25)];
+        let [uncovered, overshoot] = errors(&mesh, &balls, TOLERANCE);
+        holds(overshoot, 0.75);
+        holds(uncovered, Vec3::new(1.0, 0.25, 0.25).length() - 0.25);
+    }
+
+    #[test]
+    fn samples_never_contradict_the_intervals() {
+        let mut mesh = TriMesh::default();
+        sides(Vec3::new(0.4, 0.1, 0.05), Vec3::ZERO, false, &mut mesh);
+        sides(Vec3::new(0.1, 0.2, 0.05), Vec3::new(0.2, 0.4, 0.0), false, &mut mesh);
+        let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
+        let test = CoverTest::new(&mesh.vertices, &tree, &inside);
+        let mut random = Pcg64::seed_from_u64(5);
+        let mut point =
+            |scale: f64| scale * Vec3::from([0; 3].map(|_| random.random_range(-1.0..1.0)));
+        for round in 0..6 {
+            let ball = |_| Sphere::new(point(0.5), 0.02 + 0.1 * point(1.0).x.abs());
+            let balls: Vec<_> = (0..10 + 8 * round).map(ball).collect();
+            let [uncovered, overshoot] = errors(&mesh, &balls, TOLERANCE);
+            let sigma =
+                |p: Vec3| balls.iter().map(|b| b.signed_distance(p)).fold(f64::INFINITY, f64::min);
+            let mut largest = [0.0_f64; 2];
+            for _ in 0..20_000 {
+                let p = point(0.7);
+                if test.height(p) == 0.0 {
+                    largest[0] = largest[0].max(sigma(p));
+                }
+                if sigma(p) <= 0.0 {
+                    largest[1] = largest[1].max(test.height(p));
+                }
+            }
+            for (sampled, interval) in largest.into_iter().zip([uncovered, overshoot]) {
+                let OneSided { upper, lower, .. } = interval;
+                assert!(sampled <= upper && sampled > lower - 0.06, "{sampled} {interval:?}");
+            }
+            let at = uncovered.witness.unwrap();
+            assert!(test.height(at) < 1e-9 && (sigma(at) - uncovered.lower).abs() < 1e-8);
+            let at = overshoot.witness.unwrap();
+            assert!(sigma(at) < 1e-9 && (test.height(at) - overshoot.lower).abs() < 1e-8);
+        }
+    }
+
+    #[test]
+    fn unmeasurable_balls_are_errors() {
+        let mesh = cube(0.25);
+        let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
+        let test = CoverTest::new(&mesh.vertices, &tree, &inside);
+        assert!(matches!(test.uncovered(&[], 1e-3), Err(MetricError::Union(_))));
+        let balls = [Sphere::new(Vec3::ZERO, 0.1)];
+        assert_eq!(test.overshoot(&balls, 0.0), Err(MetricError::Tolerance(0.0)));
+        assert!(test.overshoot(&[Sphere::new(Vec3::ZERO, f64::NAN)], 1e-3).is_err());
+    }
+}
