@@ -93,7 +93,7 @@ const BEYOND: f64 = 1e-5;
 
 /// Spheres that cover, as a method.
 ///
-/// Supports all levels from one sphere to [`MOST`]. Cost: about the spheres times the points in each sweep.
+/// Supports all levels from one sphere to 1,000. Cost: about the spheres times the points in each sweep.
 pub fn method() -> Method<CoverParams> {
     let info = MethodInfo::new("cover", "Covering spheres")
         .seeded()
