@@ -105,7 +105,7 @@ enum Colour {
     Stability,
     /// The distance by which each sphere exceeds the surface (red) or falls short of it (blue).
     Error,
-    /// The sheet. Each sheet has spheres of its own, seams and curves are black lines, junctions isolated spheres.
+    /// One colour for each sheet. Sheets get separate spheres. Seams and curves are black lines, junctions isolated spheres.
     Sheet,
 }
 

@@ -247,7 +247,7 @@ impl PreparedCover<'_> {
         level: Level,
         inner: &[Sphere],
         gap: OneSided,
-        mut diagnostics: Diagnostics,
+        diagnostics: Diagnostics,
     ) -> Result<Simplified> {
         let mood = self.params.mood;
         let added = match mood {
@@ -257,9 +257,7 @@ impl PreparedCover<'_> {
         };
         let spheres = inner.iter().map(|ball| Sphere::new(ball.centre, ball.radius + added));
         let mesh = MedialMesh::from_simplices(spheres.collect(), vec![], vec![])?;
-        let error = mood.error(gap);
-        diagnostics.count("error_in_millionths", (1e6 * error).ceil() as usize);
-        checked(level, mesh, Some(error), diagnostics)
+        checked(level, mesh, Some(mood.error(gap)), diagnostics)
     }
 
     /// The level by error: the fewest spheres that a search over their number finds within it.

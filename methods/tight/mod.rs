@@ -13,7 +13,8 @@
 //!    with a sparse Cholesky factorisation. A step that would take a centre out of the
 //!    solid, fold a face over or make one cross another is taken back there (`collapse.rs`).
 //! 4. *Collapse* (`collapse.rs`): passes of the cheapest edges, priced by the samples that their stars
-//!    serve; a few steps of 3 after each pass, at the power 4.
+//!    serve; a few steps of 3 after each pass, at the power 4. Within five times the target, the places of the
+//!    largest errors join the samples after each pass, and after each swap of 5.
 //! 5. *Swap* (`start.rs`): spheres are inserted where the error is largest, and as many edges collapsed
 //!    where it hurts least. Only the spheres around them move then (`settle`).
 //! 6. *Rounds* (`rounds.rs`): steps of 3 at powers up to 32, between which the largest errors, found by

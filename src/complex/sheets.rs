@@ -103,7 +103,7 @@ struct Pieces<'a> {
 }
 
 impl SheetGraph {
-    /// The sheet graph of a mesh in canonical form. Cost `O(n log n)`.
+    /// The sheet graph of a mesh in canonical form. Cost `O(n log n)`, and the pairs of seam ends of nearly equal x.
     ///
     /// # Panics
     /// If the mesh is not in canonical form; see [`MedialMesh::check`].
@@ -159,8 +159,8 @@ impl SheetGraph {
         7.0 / 8.0 * sheet.map_or(0.5, spread)
     }
 
-    /// The mesh for a picture, and for each of its spheres a place in [`ColourMap::Parts`](crate::ColourMap). Each sheet has
-    /// spheres of its own, so that no colour runs into the next; seams and curves are edges without a face, junctions
+    /// The mesh for a picture, and for each of its spheres a place in [`ColourMap::Parts`](crate::ColourMap). Sheets get
+    /// separate spheres, so that no colour runs into the next. Seams and curves are edges without a face, junctions
     /// isolated spheres.
     ///
     /// # Panics

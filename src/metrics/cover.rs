@@ -214,7 +214,7 @@ fn check(balls: &[Sphere], tolerance: f64) -> Result<(), MetricError> {
     if !(FINEST..=1.0).contains(&tolerance) {
         return Err(MetricError::Tolerance(tolerance));
     }
-    // The union reports what is wrong with them.
+    // The checks of a union: there are balls, and all are finite.
     crate::complex::MedialUnion::of_spheres(balls)
         .map(drop)
         .map_err(|error: UnionError| error.into())
