@@ -354,6 +354,40 @@ pub(crate) const STRUCTURE: [&Metric; 7] = [
     &OUTSIDE_AREA,
 ];
 
+// One-sided errors, of spheres without edges or with a certificate: a table and a plot of their own. Both are the upper
+// ends of intervals, so that 0 is a proof.
+pub(crate) const UNCOVERED: Metric =
+    length("uncovered", "uncovered, at most", |e| Some(e.cover?.uncovered.upper))
+        .at("cover.uncovered.upper");
+
+pub(crate) const OVERSHOOT: Metric =
+    length("overshoot", "overshoot, at most", |e| Some(e.cover?.overshoot.upper))
+        .at("cover.overshoot.upper");
+
+pub(crate) const LARGER_SIDE: Metric = length("uncovered_or_overshoot", "larger of both", |e| {
+    Some(e.cover?.uncovered.upper.max(e.cover?.overshoot.upper))
+})
+.at("")
+.defined(
+    "The larger of the distance from the farthest point of the solid to the union and the distance from the farthest \
+     point of the union to the solid.",
+);
+
+pub(crate) const UNCOVERED_MEAN: Metric =
+    length("uncovered_mean", "uncovered, mean", |e| Some(e.cover?.uncovered_over_surface.mean))
+        .at("cover.uncovered_over_surface.mean");
+
+pub(crate) const OVERSHOOT_MEAN: Metric =
+    length("overshoot_mean", "overshoot, mean", |e| Some(e.cover?.overshoot_over_boundary.mean))
+        .at("cover.overshoot_over_boundary.mean");
+
+pub(crate) const VOLUME_RATIO: Metric =
+    share("volume_ratio", "union's volume", "% of the solid's", |e| e.volume_ratio).neutral();
+
+/// The columns of the table of cover.
+pub(crate) const COVER: [&Metric; 6] =
+    [&UNCOVERED, &OVERSHOOT, &LARGER_SIDE, &UNCOVERED_MEAN, &OVERSHOOT_MEAN, &VOLUME_RATIO];
+
 pub(crate) const TOTAL_SECONDS: Metric = Metric::new(
     "seconds_total",
     "time",
@@ -410,6 +444,19 @@ pub const METRICS: &[Metric] = &[
     length("protrusion", "outside the solid, max", |e| e.protrusion).gate(),
     share("centres_outside", "centres outside", "% of spheres", |e| e.centres_outside).gate(),
     share("volume_error", "volume error", "% of the volume", |e| e.volume_error).gate(),
+    VOLUME_RATIO,
+    length("uncovered_lower", "uncovered, at least", |e| Some(e.cover?.uncovered.lower))
+        .at("cover.uncovered.lower"),
+    UNCOVERED,
+    UNCOVERED_MEAN,
+    length("uncovered_p95", "uncovered, 95 %", |e| Some(e.cover?.uncovered_over_surface.p95))
+        .at("cover.uncovered_over_surface.p95"),
+    length("overshoot_lower", "overshoot, at least", |e| Some(e.cover?.overshoot.lower))
+        .at("cover.overshoot.lower"),
+    OVERSHOOT,
+    OVERSHOOT_MEAN,
+    length("overshoot_p95", "overshoot, 95 %", |e| Some(e.cover?.overshoot_over_boundary.p95))
+        .at("cover.overshoot_over_boundary.p95"),
     MIN_ANGLE,
     angle("max_angle_mean", "max angle", |e| e.quality.max_angle_mean).neutral(),
     BELOW_30,

@@ -13,7 +13,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::comparison::{Comparison, Entry, RISING, RISING_NOTE, level_label, reached};
 use crate::header::Header;
-use crate::metric::{COMPLETENESS, GEOMETRIC, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
+use crate::metric::{
+    COMPLETENESS, GEOMETRIC, HAUSDORFF, LARGER_SIDE, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS,
+};
 use crate::record::{Record, Status, Target};
 use crate::statistics::interval;
 use crate::tables::{Cell, Table};
@@ -203,8 +205,8 @@ fn at_count(
             set.levels.contains(&level) && entry.comparable() && set.meshes.contains(&entry.mesh)
         });
         let (mut means, mut intervals) = (BTreeMap::new(), BTreeMap::new());
-        // One more for a plot.
-        for metric in comparison.columns().into_iter().chain([&COMPLETENESS]) {
+        // Two more for plots.
+        for metric in comparison.columns().into_iter().chain([&COMPLETENESS, &LARGER_SIDE]) {
             let known = set.known(comparison, series, metric);
             let values = averaged.iter().filter(|entry| known.contains(&entry.mesh));
             let values: Vec<f64> = values.filter_map(|entry| metric.of(entry.record)).collect();

@@ -19,7 +19,7 @@ use crate::plots::{Figure, mean_figures, mesh_figures, profile_figures, profiles
 use crate::record::Record;
 use crate::statistics::{difference_tables, differences_csv};
 use crate::summary::{MEANS, by_count, means_table, native_curves, native_table};
-use crate::tables::{Table, mesh_table, structure_table, to_csv, to_latex, to_markdown};
+use crate::tables::{Table, mesh_table, to_csv, to_latex, to_markdown, topic_tables};
 use crate::text::file_stems;
 use crate::view3d::text_of;
 
@@ -69,9 +69,14 @@ pub fn write_report(
         files.write_tables("overview-purpose", "Which method?", answers.as_slice())?;
     }
 
-    let structure: Vec<Table> = structure_table(&comparison, &how).into_iter().collect();
-    if !structure.is_empty() {
-        files.write_tables("overview-structure", "Structure", &structure)?;
+    let [structure, cover] =
+        topic_tables(&comparison, &how).map(|table| table.into_iter().collect::<Vec<_>>());
+    for (stem, title, tables) in
+        [("structure", "Structure", &structure), ("cover", "Cover", &cover)]
+    {
+        if !tables.is_empty() {
+            files.write_tables(&format!("overview-{stem}"), title, tables)?;
+        }
     }
     let differences = if is_one { vec![] } else { difference_tables(&comparison, &how) };
     let profiles = profile_figures(&comparison);
@@ -126,7 +131,8 @@ pub fn write_report(
         // Means over one mesh are its results.
         means.retain(|table| table.caption != MEANS);
     }
-    let structure: Vec<Table> = structure.into_iter().map(Table::known).collect();
+    let [structure, cover] =
+        [structure, cover].map(|tables| tables.into_iter().map(Table::known).collect());
     for table in means.iter_mut().chain(&mut equal_error) {
         let known = table.clone().known();
         *table = if is_one { known.of_one_mesh() } else { known };
@@ -135,6 +141,7 @@ pub fn write_report(
         ("differences", "Which differences are established?", differences),
         ("equal-error", "Equal error", equal_error),
         ("structure", "Structure", structure),
+        ("cover", "Cover", cover),
         ("means", if is_one { "Native levels" } else { "Means over meshes" }, means),
     ];
     let page = Page {

@@ -112,6 +112,9 @@ pub struct Arguments {
     /// Certify each Hausdorff error by an interval of this width, as a fraction of the diagonal.
     #[arg(long, value_name = "WIDTH")]
     certify: Option<f64>,
+    /// Measure the spheres of each result alone, without its edges and faces: for collision spheres and clumps.
+    #[arg(long)]
+    spheres_alone: bool,
     #[command(flatten)]
     substrate: SubstrateArguments,
     #[command(flatten)]
@@ -292,6 +295,7 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     study.memory = arguments.memory.or(study.memory);
     study.keep = arguments.keep.unwrap_or(study.keep);
     study.certify = arguments.certify.or(study.certify);
+    study.spheres_alone |= arguments.spheres_alone;
     study.threads = global.threads.or(study.threads);
     study.plugins.extend(global.plugins.iter().map(absolute));
     arguments.substrate.apply(&mut study)?;

@@ -4,10 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use medial::complex::{LoadedMa, MedialMesh};
-use medial::metrics::{
-    Certificate, Cover, Evaluation, Judge, MeanAndP95, MetricError, OneSided, Witness, WitnessSide,
-    sheet_difference,
-};
+use medial::metrics::{Evaluation, Judge, MetricError, Witness, WitnessSide, sheet_difference};
 use medial::shape::{Fit, Shape, ShapeOptions};
 use medial_reports::{measured_rows, significant};
 use serde::Serialize;
@@ -35,12 +32,15 @@ pub struct Arguments {
     /// Set the seed of the samples.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Certify the Hausdorff distance by an interval of at most this width, as a fraction of the diagonal. Spheres
-    /// without edges also get certified one-sided errors: `uncovered`, the deepest point of the solid outside all
-    /// spheres, and `overshoot`, the farthest point of a sphere outside the solid [default for these: 0.001].
-    /// `surface to union, max` is neither: it measures to the boundary of the union, from both of its sides.
+    /// Certify the Hausdorff distance and the one-sided errors by intervals of at most this width, as a fraction of the
+    /// diagonal. `uncovered` is the largest distance from a point of the solid to the union, and `overshoot` from a
+    /// point of the union to the solid. Spheres without edges always have them [default: 0.001]. `surface to union,
+    /// max` is neither: it measures to the boundary of the union, from both of its sides.
     #[arg(long, value_name = "TOL")]
     certify: Option<f64>,
+    /// Measure the spheres alone, without edges and faces.
+    #[arg(long)]
+    spheres_alone: bool,
     /// Also print the rank of each result among those of an edition at its sphere count, measured as the edition is: a
     /// name such as `2027.1`, or a folder.
     #[arg(long, value_name = "EDITION", conflicts_with_all = ["samples", "seed"])]
@@ -90,9 +90,6 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
             print_json(&row, &warnings);
         } else {
             print_evaluation(&row.evaluation);
-            for (title, text) in row.cover.iter().flat_map(cover_rows) {
-                print_line(&format!("  {title:<32} {text}"));
-            }
             row.place.iter().for_each(|place| print_line(&format!("  {place}")));
             let all = row.evaluation.warnings.iter().chain(&warnings);
             all.for_each(|warning| print_line(&format!("  warning: {warning}")));
@@ -113,9 +110,6 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
 struct Evaluated {
     #[serde(flatten)]
     evaluation: Evaluation,
-    /// One-sided errors, of spheres without edges.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    cover: Option<Cover>,
     /// The change of units before the evaluation, if `--fit` found one.
     #[serde(skip_serializing_if = "Option::is_none")]
     fit: Option<Fit>,
@@ -148,52 +142,14 @@ fn evaluate(
     let (loaded, fit) = read_axis(path, shape, arguments.fitting)?;
     let LoadedMa { mesh, notes, warnings: defects, .. } = loaded;
     let mesh = normalised(&mesh, shape);
-    let certified = arguments.certify.map(|tolerance| judge.certify(&mesh, tolerance));
-    let mut certified = certified.transpose().map_err(failed)?;
-    if let Some(Certificate { witness, .. }) = &mut certified {
-        // The point is looked for in the surface file.
-        witness.point = shape.normalisation().backward(witness.point);
-    }
-    let mut evaluation = Evaluation { certified, ..judge.evaluate(&mesh).map_err(failed)? };
+    let mesh = if arguments.spheres_alone { mesh.spheres_alone() } else { mesh };
+    let mut evaluation = judge.evaluate_certified(&mesh, arguments.certify).map_err(failed)?;
+    // Points are looked for in the surface file.
+    evaluation.move_witnesses(|point| shape.normalisation().backward(point));
     if let (Some(reference), Some(structure)) = (reference, &mut evaluation.structure) {
         structure.known = Some(sheet_difference(&mesh, reference).map_err(failed)?);
     }
-    let tolerance = arguments.certify.unwrap_or(COVER_TOLERANCE);
-    let is_list = mesh.edges.is_empty();
-    let mut cover = match is_list.then(|| judge.cover(&mesh.spheres, tolerance)).transpose() {
-        Ok(cover) => cover,
-        // The other measures hold without them, as of spheres in other units.
-        Err(error) if arguments.certify.is_none() => {
-            evaluation.warnings.push(format!("no one-sided errors: {error}"));
-            None
-        }
-        Err(error) => return Err(failed(error)),
-    };
-    if let Some(cover) = &mut cover {
-        for error in [&mut cover.uncovered, &mut cover.overshoot] {
-            error.witness = error.witness.map(|point| shape.normalisation().backward(point));
-        }
-    }
-    Ok(Evaluated { evaluation, cover, fit, place: None, notes, defects })
-}
-
-/// Width of the intervals of one-sided errors where none is requested.
-const COVER_TOLERANCE: f64 = 1e-3;
-
-/// One-sided errors as rows of a title and a text, lengths in percent of the diagonal.
-fn cover_rows(cover: &Cover) -> [(&'static str, String); 4] {
-    let percent = |x: f64| significant(100.0 * x, 3);
-    let interval = |e: &OneSided| match e.upper {
-        0.0 => "0, proven".to_owned(),
-        _ => format!("{} to {}", percent(e.lower), percent(e.upper)),
-    };
-    let sampled = |s: &MeanAndP95| format!("{}, {}", percent(s.mean), percent(s.p95));
-    [
-        ("uncovered (%)", interval(&cover.uncovered)),
-        ("overshoot (%)", interval(&cover.overshoot)),
-        ("uncovered, mean, 95 % (%)", sampled(&cover.uncovered_over_surface)),
-        ("overshoot, mean, 95 % (%)", sampled(&cover.overshoot_over_boundary)),
-    ]
+    Ok(Evaluated { evaluation, fit, place: None, notes, defects })
 }
 
 /// A medial mesh in units of the surface's diagonal.
@@ -261,18 +217,6 @@ fn print_table(
         values.insert(0, metric);
         values
     }));
-    let covers: Vec<_> =
-        rows.iter().flatten().map(|row| row.cover.as_ref().map(cover_rows)).collect();
-    if let Some(titles) = covers.iter().flatten().next() {
-        for (k, (title, _)) in titles.iter().enumerate() {
-            let mut row = vec![(*title).to_owned()];
-            row.extend(covers.iter().map(|cover| match cover {
-                Some(rows) => rows[k].1.clone(),
-                None => "-".to_owned(),
-            }));
-            table.push(row);
-        }
-    }
     let widths: Vec<usize> = (0..table[0].len())
         .map(|column| table.iter().map(|row| row[column].chars().count()).max().unwrap_or(0))
         .collect();

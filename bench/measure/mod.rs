@@ -179,11 +179,10 @@ fn judge_one(scene: &Scene, mesh: &MedialMesh) -> Verdict {
     let hash = mesh_hash(mesh);
     // Hashed before: the hash is that of the method's own output.
     let mesh = scene.carried(mesh);
+    let measure = &scene.spec.measure;
+    let mesh = if measure.spheres_alone { mesh.spheres_alone() } else { mesh };
     let begun = Instant::now();
-    let certified =
-        scene.spec.measure.certify.map(|width| scene.judge.certify(&mesh, width)).transpose();
-    let evaluation = certified
-        .and_then(|certified| Ok(Evaluation { certified, ..scene.judge.evaluate(&mesh)? }));
+    let evaluation = scene.judge.evaluate_certified(&mesh, measure.certify);
     let seconds = begun.elapsed().as_secs_f64();
     Verdict { evaluation, seconds, hash }
 }

@@ -234,6 +234,7 @@ impl Edition {
     pub fn check(&self, study: &Study, items: &[Item]) -> Result<(), EditionError> {
         let Description { samples, volume_depth, seed, sampling, dual, .. } = &self.description;
         let settings = [
+            ("spheres-alone", study.spheres_alone.to_string(), false.to_string()),
             ("samples", study.samples.to_string(), samples.to_string()),
             ("volume-depth", VOLUME_DEPTH.to_string(), volume_depth.to_string()),
             ("seed", study.seed.to_string(), seed.to_string()),

@@ -102,6 +102,9 @@ pub struct Measure {
     /// for no certificate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certify: Option<f64>,
+    /// Whether edges and faces are dropped before the evaluation.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub spheres_alone: bool,
 }
 
 /// A method, its parameters, and the name of this pair in tables.
@@ -263,7 +266,13 @@ mod tests {
                 noise: None,
                 sampling: Sampling::default(),
                 dual: Dual::Fan,
-                measure: Measure { samples: 100, volume_depth: 5, seed: 0, certify: None },
+                measure: Measure {
+                    samples: 100,
+                    volume_depth: 5,
+                    seed: 0,
+                    certify: None,
+                    spheres_alone: false,
+                },
             },
             method: MethodSpec {
                 id: "qmat".into(),

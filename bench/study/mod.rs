@@ -94,6 +94,9 @@ pub struct Study {
     /// Width of the certified interval of each Hausdorff error, a fraction of the diagonal; `None` for no certificate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certify: Option<f64>,
+    /// Whether results are measured as spheres alone, without edges and faces.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub spheres_alone: bool,
     /// Number of threads [default: all processors].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threads: Option<usize>,
@@ -181,6 +184,7 @@ impl Default for Study {
             dual: Dual::default(),
             samples: SAMPLES,
             certify: None,
+            spheres_alone: false,
             threads: None,
             timeout: TIMEOUT,
             budget: BUDGET,
@@ -419,6 +423,7 @@ impl Study {
                     volume_depth: VOLUME_DEPTH,
                     seed: self.seed,
                     certify: self.certify,
+                    spheres_alone: self.spheres_alone,
                 },
             };
             let noisy = self.noise.iter().map(|&eta| {

@@ -36,6 +36,10 @@
 //!    again; the witness of the certificate joins them.
 //! 6. *Proof*: the upper end of the certified interval of `G` ([`CoverTest::uncovered`]) decides the radii.
 //!
+//! With `radii=equal` the depth in `f_c` is that of the least deep centre, and `G` the covering radius of
+//! the centres less that depth. Candidates and steps are restricted to centres of at least a common depth, which is
+//! the best of a sequence of depths for the start.
+//!
 //! The native level is the allowed error of the mood: a search over N.
 
 mod placement;
@@ -115,7 +119,19 @@ medial::parameters! {
         /// The spheres contain the solid (`outside`), fit into it (`inside`), or deviate from it by the same
         /// on both sides (`balanced`).
         mood: Mood = Mood::Balanced, "balanced, outside or inside";
+        /// Whether each sphere has the radius that suits it (`free`), or all have the same (`equal`).
+        radii: Radii = Radii::Free, "free or equal";
     }
+}
+
+/// Radii of spheres in relation to each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Radii {
+    /// Each its own.
+    Free,
+    /// One for all.
+    Equal,
 }
 
 /// The side on which spheres deviate from a solid.
@@ -191,6 +207,8 @@ impl PreparedCover<'_> {
             )));
         }
         let solid = Solid::new(shape, tree, inside, run.seed);
+        let is_equal = self.params.radii == Radii::Equal;
+        let solid = if is_equal { solid.with_equal_balls(count) } else { solid };
         let candidates = solid.candidates(count);
         if candidates.is_empty() {
             return Err(SimplifyError::unsupported(
@@ -198,7 +216,7 @@ impl PreparedCover<'_> {
             ));
         }
         let mut pool = solid.points(count, &candidates);
-        let mut chosen = Gaps::new(&candidates, &pool).start(count);
+        let mut chosen = Gaps::new(&candidates, &pool).start(count).0;
         // With spheres to spare, the largest balls that are left.
         let spare = (0..candidates.len()).filter(|k| !chosen.contains(k));
         let spare: Vec<usize> = spare.take(count - chosen.len()).collect();
@@ -234,7 +252,12 @@ impl PreparedCover<'_> {
             pool.extend(gap.witness);
         }
         diagnostics.count("swaps", swaps);
-        let balls = best.map_or_else(|| placement.balls.clone(), |(balls, _)| balls);
+        let mut balls = best.map_or_else(|| placement.balls.clone(), |(balls, _)| balls);
+        if is_equal {
+            let depths = balls.iter().map(|ball| tree.closest(ball.centre).distance);
+            let least = depths.fold(f64::INFINITY, f64::min);
+            balls.iter_mut().for_each(|ball| ball.radius = least);
+        }
         let rough = self.test().uncovered(&balls, ROUGH_FIRST).map_err(failed)?;
         let width = (WIDTH * rough.upper).max(LEAST_WIDTH);
         let gap = self.test().uncovered(&balls, width).map_err(failed)?;

@@ -56,6 +56,11 @@ const LOCAL: [usize; 2] = [4, 10];
 /// An inner ball smaller than this, in diagonals, is of no use.
 const SMALLEST_BALL: f64 = 1e-6;
 
+/// Equal radii that are tried, from that of the largest inner ball downwards, and the candidates of each.
+const RADII: i32 = 14;
+const RADIUS_STEP: f64 = 0.8;
+const RADIUS_CANDIDATES: usize = 1_000;
+
 /// Times that a ball shrinks after a step.
 const SHRINKS: usize = 5;
 
@@ -67,16 +72,38 @@ pub(super) struct Solid<'a> {
     /// The longest side of its box.
     side: f64,
     seed: u64,
+    /// The radius of all inner balls, where they are equal; then no centre is less deep.
+    common: Option<f64>,
 }
 
 impl<'a> Solid<'a> {
     pub fn new(shape: &'a Shape, tree: &'a TriangleBvh, inside: &'a InsideTest, seed: u64) -> Self {
         let mesh = shape.mesh();
         let (lo, hi) = mesh.bounding_box().unwrap_or_default();
-        Self { mesh, tree, inside, side: (hi - lo).max_element(), seed }
+        Self { mesh, tree, inside, side: (hi - lo).max_element(), seed, common: None }
     }
 
-    /// Medial balls of surface points, the largest first.
+    /// The solid for equal balls. Of a sequence of radii it takes the one with the smallest gap of the greedy start:
+    /// large balls leave thin parts, and small balls everything else.
+    pub fn with_equal_balls(self, spheres: usize) -> Self {
+        let largest = self.candidates(spheres).first().map(|ball| ball.radius);
+        let radii = (0..RADII).filter_map(|k| Some(RADIUS_STEP.powi(k) * largest?));
+        let gaps = radii.filter_map(|radius| {
+            let solid = Self { common: Some(radius), ..self };
+            let candidates = solid.candidates(spheres);
+            let points = solid.points(spheres, &candidates);
+            let some = candidates
+                .iter()
+                .copied()
+                .step_by(candidates.len().div_ceil(RADIUS_CANDIDATES).max(1));
+            let some: Vec<Sphere> = some.collect();
+            (!some.is_empty()).then(|| (Gaps::new(&some, &points).start(spheres).1, radius))
+        });
+        let common = gaps.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, radius)| radius);
+        Self { common, ..self }
+    }
+
+    /// Inner balls that touch surface points, the largest first: medial balls, or equal ones.
     pub fn candidates(&self, spheres: usize) -> Vec<Sphere> {
         let count = (CANDIDATES_EACH * spheres).clamp(CANDIDATES[0], CANDIDATES[1]);
         let samples = sample_with_faces(self.mesh, count, self.seed);
@@ -87,9 +114,18 @@ impl<'a> Solid<'a> {
                 shrinking_ball(p, normal, self.side, Touched::Mesh(self.tree)).sphere.centre;
             let depth = self.tree.closest(centre).distance;
             let is_inner = depth > SMALLEST_BALL && self.inside.side(centre) == Side::Inside;
-            is_inner.then(|| Sphere::new(centre, depth))
+            let balls = match self.common {
+                None => [Some(Sphere::new(centre, depth)), None],
+                // The medial centre, and the one that is just deep enough.
+                Some(radius) => {
+                    let equal = (depth >= radius).then(|| Sphere::new(centre, radius));
+                    let outer = self.grown(p - (1.0 - 1e-9) * radius * normal, [1.0, 0.0, 0.0]);
+                    [equal, equal.and(outer)]
+                }
+            };
+            balls.into_iter().flatten().filter(move |_| is_inner)
         };
-        let mut balls: Vec<Sphere> = samples.par_iter().filter_map(ball).collect();
+        let mut balls: Vec<Sphere> = samples.par_iter().flat_map_iter(ball).collect();
         balls.sort_by(|a, b| b.radius.total_cmp(&a.radius));
         balls
     }
@@ -114,6 +150,13 @@ impl<'a> Solid<'a> {
         let closest = self.tree.closest(centre);
         if moved >= depth && self.inside.side(centre) != Side::Inside {
             return None;
+        }
+        if let Some(radius) = self.common {
+            let outward = (closest.point - centre).normalize_or_zero();
+            let inner = centre - (radius - closest.distance).max(0.0) * outward;
+            let is_deep =
+                inner == centre || self.tree.closest(inner).distance >= radius * (1.0 - 1e-9);
+            return is_deep.then(|| Sphere::new(inner, radius));
         }
         let small = Sphere::new(centre, closest.distance);
         let contact = closest.point;
@@ -196,8 +239,8 @@ impl Gaps {
         greedy_cover(&self.0, gap as f32, self.0.len()).map(|chosen| chosen.len())
     }
 
-    /// At most `count` candidates with a small largest gap: by halving the threshold's interval.
-    pub fn start(&self, count: usize) -> Vec<usize> {
+    /// At most `count` candidates with a small largest gap, and a bound on it: by halving the threshold's interval.
+    pub fn start(&self, count: usize) -> (Vec<usize>, f32) {
         let most = self.0.first().map_or(0.0, |row| row.iter().copied().fold(0.0, f32::max));
         let (mut low, mut high) = (0.0, most);
         let mut best = vec![0];
@@ -208,7 +251,7 @@ impl Gaps {
                 None => low = middle,
             }
         }
-        best
+        (best, high)
     }
 }
 

@@ -82,6 +82,31 @@ fn moods_are_proven_on_a_box_a_torus_and_a_thin_plate() {
 }
 
 #[test]
+fn equal_radii_are_equal_and_proven() {
+    let torus = medial_datasets::find("torus").expect("a built-in shape");
+    let shapes = [cuboid(Vec3::new(4.0, 2.0, 1.0)), shape(&torus.mesh(torus.default_resolution))];
+    for shape in &shapes {
+        let mut gaps = vec![];
+        for (mood, side) in [("outside", 0), ("inside", 1), ("balanced", 2)] {
+            let mut params = Params::none();
+            params.set("mood", mood);
+            params.set("radii", "equal");
+            let run = RunContext::default();
+            let prepared = method().prepare(shape, &params, &run);
+            let result = prepared.expect("prepared").at(Level::Spheres(24)).expect("spheres");
+            let balls = &result.mesh.spheres;
+            assert!(balls.iter().all(|ball| ball.radius == balls[0].radius), "{mood}");
+            let found = errors(shape, &result);
+            assert!(found.get(side).is_none_or(|&error| error == 0.0), "{mood}: {found:?}");
+            gaps.push(found[0].max(found[1]));
+        }
+        let free = run(shape, "outside", Level::Spheres(24)).expect("spheres");
+        assert!(gaps[2] < 0.55 * gaps[0], "{gaps:?}");
+        assert!(errors(shape, &free)[1] < 1.02 * gaps[0], "{gaps:?}");
+    }
+}
+
+#[test]
 fn an_error_gives_few_spheres_within_it() {
     let shape = cuboid(Vec3::new(4.0, 2.0, 1.0));
     for mood in ["outside", "balanced"] {

@@ -290,18 +290,9 @@ impl Axis {
             let units = *shape.normalisation();
             let judge = model.judge(options)?;
             let normal = mesh.transformed(1.0 / units.diagonal, |point| units.forward(point));
-            let certified = match certify {
-                None => None,
-                Some(tolerance) => {
-                    monitor.at("certifying the Hausdorff distance");
-                    let mut certificate = judge.certify(&normal, tolerance)?;
-                    certificate.witness.point = units.backward(certificate.witness.point);
-                    Some(certificate)
-                }
-            };
-            monitor.at("measuring");
-            let evaluation = judge.evaluate(&normal)?;
-            let evaluation = medial::metrics::Evaluation { certified, ..evaluation };
+            monitor.at(if certify.is_some() { "measuring and certifying" } else { "measuring" });
+            let mut evaluation = judge.evaluate_certified(&normal, certify)?;
+            evaluation.move_witnesses(|point| units.backward(point));
             serde_json::to_string(&evaluation).map_err(|error| Failure::new(Kind::Internal, error))
         })
     }

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, Entry, reached, rises};
 use crate::metric::{
-    COMPLETENESS, HAUSDORFF, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS,
+    COMPLETENESS, HAUSDORFF, LARGER_SIDE, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS,
 };
 use crate::summary::{CountSummary, NativeCurve};
 use crate::text::{grouped, significant};
@@ -92,13 +92,14 @@ impl Figure {
 /// A kind of figures, one for each mesh and one of the means over all: name, title, and the metric upwards.
 struct Kind(&'static str, &'static str, &'static Metric);
 
-const KINDS: [Kind; 6] = [
+const KINDS: [Kind; 7] = [
     Kind("hausdorff", "Hausdorff error against spheres", &HAUSDORFF),
     Kind("time", "Hausdorff error against time", &HAUSDORFF),
     Kind("mean", "Mean error against spheres", &MEAN_ERROR),
     Kind("angles", "Triangle quality: mean smallest angle", &MIN_ANGLE),
     Kind("spikes", "Spikes left", &SPIKES),
     Kind("structure", "Axis missed against spheres", &COMPLETENESS),
+    Kind("cover", "Uncovered or overshoot against spheres", &LARGER_SIDE),
 ];
 
 impl Kind {
@@ -119,6 +120,7 @@ impl Kind {
             "spikes" => "spikes",
             "mean" => "mean error (% of diagonal)",
             "structure" => "axis missed, p95 (% of diagonal)",
+            "cover" => "larger of uncovered and overshoot (% of diagonal)",
             _ => "Hausdorff error (% of diagonal)",
         };
         let scale = if self.is_error() { Scale::Log } else { Scale::Linear };

@@ -3,7 +3,7 @@
 
 mod csv;
 mod mesh;
-mod structure;
+mod topics;
 
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
@@ -12,7 +12,7 @@ use crate::text::{escape_html, printable};
 
 pub(crate) use self::csv::{flatten, to_csv, warnings};
 pub(crate) use self::mesh::{Best, mesh_table, remark, topology_word};
-pub(crate) use self::structure::structure_table;
+pub(crate) use self::topics::topic_tables;
 
 /// A table before it takes a format.
 #[derive(Clone, Default, Serialize)]

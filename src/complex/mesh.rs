@@ -118,6 +118,11 @@ impl MedialMesh {
         simplex.map(|v| self.spheres[v as usize])
     }
 
+    /// The spheres without edges and faces.
+    pub fn spheres_alone(&self) -> Self {
+        Self { edges: Vec::new(), faces: Vec::new(), ..self.clone() }
+    }
+
     /// Edges without a face, in their order: for formats whose faces imply their sides.
     pub(crate) fn lone_edges(&self) -> Vec<[u32; 2]> {
         let incidence = Incidence::of(self);

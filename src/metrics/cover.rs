@@ -1,7 +1,7 @@
-//! One-sided errors of a union of balls against a solid, each in a certified interval.
+//! One-sided errors of a union of balls, or of a medial mesh, against a solid, each in a certified interval.
 //!
-//! With the solid K, bounded by a closed surface, the union U of the balls `(c_i, r_i)`, and
-//! `sigma(p) = min_i |p - c_i| - r_i`:
+//! With the solid K, bounded by a closed surface, the union U of some balls and hulls of two or three balls,
+//! and `sigma(p)` the least signed distance to one of them:
 //!
 //! - `uncovered` is the largest `sigma(p)` over K, boundary and interior, and 0 if it is negative: the
 //!   distance from U to the farthest point of the solid outside it;
@@ -10,15 +10,18 @@
 //! Unlike the two sides of [`certify`](super::certify), which measure boundaries, neither counts a
 //! point that is in both, and `uncovered` sees holes of U inside the solid.
 //!
-//! Both are found by branch and bound over cubes. Each cube has the list of the balls that can matter
+//! Both are found by branch and bound over cubes. Each cube has the list of the bodies that can matter
 //! in it, which its eighths inherit. With the centre `q` and half diagonal `h` of a cube:
 //!
 //! 1. Over a cube, the signed distance to one ball is largest at the corner farthest from its centre.
-//!    So the least of these bounds `sigma` from above, and a cube in one ball is covered.
+//!    So the least of these bounds `sigma` from above, and a cube in one ball is covered. The signed
+//!    distance to a hull exceeds that at `q` by at most `h`.
 //! 2. A cube is outside K, or within it, if `q` is and the surface is farther away than `h`.
 //! 3. A ball with its centre at the signed distance `s` from K (negative inside) is nowhere farther
 //!    from K than `r + s`, since the distance to K is 1-Lipschitz and a ball of radius `-s` fits into K.
 //!    So balls with `r <= -s` need no search, and the others bound the overshoot in the cubes they meet.
+//!    The centres of a hull lie within its longest edge of each corner, so with the largest `r`, the least
+//!    `s` and the edge's length the same holds for a hull.
 //! 4. Everything else is bounded by distances being 1-Lipschitz.
 //!
 //! All cubes of one size are evaluated in one round, so the result is the same for any number of
@@ -26,7 +29,7 @@
 //!
 //! # Proof of zero
 //!
-//! An upper end of exactly 0 is a proof: every cube is in one ball or outside K, or every ball in K,
+//! An upper end of exactly 0 is a proof: every cube is in one body or outside K, or every body in K,
 //! by more than [`ROUNDING`]. Cubes are divided beyond the tolerance for it, to a half diagonal of
 //! [`SMALLEST`]: where the margin is smaller than about that, the interval ends at a positive number.
 
@@ -35,9 +38,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{FINEST, MetricError, ROUNDING};
 use crate::Vec3;
-use crate::complex::UnionError;
-use crate::geometry::Sphere;
+use crate::complex::{MedialMesh, MedialUnion};
 use crate::geometry::trees::Bounds;
+use crate::geometry::{Cone, Slab, Sphere};
 use crate::surface::{Closest, InsideTest, Side, TriangleBvh};
 
 /// Half diagonal of the smallest cubes that a proof of zero divides, in diagonals of the surface.
@@ -64,6 +67,93 @@ pub struct OneSided {
     pub witness: Option<Vec3>,
 }
 
+/// A convex body: a ball, or the hull of two or three balls.
+trait Body: Sync {
+    /// The balls that span it.
+    fn balls(&self) -> &[Sphere];
+
+    /// Signed distance, negative inside.
+    fn signed_distance(&self, p: Vec3) -> f64;
+
+    /// The boundary point nearest to a point outside.
+    fn foot(&self, p: Vec3) -> Vec3;
+
+    /// Bounds on the signed distance over a cube from below and above.
+    fn range(&self, q: Vec3, half: f64) -> [f64; 2] {
+        let (signed, reach) = (self.signed_distance(q), HALF_DIAGONAL * half);
+        [signed - reach, signed + reach]
+    }
+}
+
+impl Body for Sphere {
+    fn balls(&self) -> &[Sphere] {
+        std::slice::from_ref(self)
+    }
+
+    fn signed_distance(&self, p: Vec3) -> f64 {
+        Self::signed_distance(self, p)
+    }
+
+    fn foot(&self, p: Vec3) -> Vec3 {
+        self.centre + self.radius * (p - self.centre).normalize_or(Vec3::X)
+    }
+
+    fn range(&self, q: Vec3, half: f64) -> [f64; 2] {
+        let apart = (q - self.centre).abs();
+        let nearest = (apart - half).max(Vec3::ZERO).length();
+        [nearest - self.radius, (apart + half).length() - self.radius]
+    }
+}
+
+/// The body of a simplex of a medial mesh.
+enum Hull {
+    Ball(Sphere),
+    Cone([Sphere; 2], Cone),
+    Slab([Sphere; 3], Box<Slab>),
+}
+
+impl Hull {
+    /// The bodies of a medial mesh, without those in a larger simplex.
+    fn of(mesh: &MedialMesh) -> Vec<Self> {
+        let faces = mesh.faces.iter().map(|&face| {
+            let balls = mesh.spheres_of(face);
+            Self::Slab(balls, Box::new(Slab::new(balls)))
+        });
+        let edges = mesh.lone_edges().into_iter().map(|edge| {
+            let balls @ [a, b] = mesh.spheres_of(edge);
+            Self::Cone(balls, Cone::new(a, b))
+        });
+        let lone = mesh.isolated().into_iter().map(|v| Self::Ball(mesh.spheres[v as usize]));
+        faces.chain(edges).chain(lone).collect()
+    }
+}
+
+impl Body for Hull {
+    fn balls(&self) -> &[Sphere] {
+        match self {
+            Self::Ball(ball) => ball.balls(),
+            Self::Cone(balls, _) => balls,
+            Self::Slab(balls, _) => &balls[..],
+        }
+    }
+
+    fn signed_distance(&self, p: Vec3) -> f64 {
+        match self {
+            Self::Ball(ball) => ball.signed_distance(p),
+            Self::Cone(_, cone) => cone.signed_distance(p),
+            Self::Slab(_, slab) => slab.signed_distance(p),
+        }
+    }
+
+    fn foot(&self, p: Vec3) -> Vec3 {
+        match self {
+            Self::Ball(ball) => Body::foot(ball, p),
+            Self::Cone(_, cone) => cone.foot(p).point,
+            Self::Slab(_, slab) => slab.foot(p).point,
+        }
+    }
+}
+
 /// A solid that unions of balls are measured against: the tree and the inside test of one closed,
 /// outward-oriented surface with a diagonal of about 1.
 #[derive(Clone, Copy, Debug)]
@@ -87,10 +177,8 @@ impl<'a> CoverTest<'a> {
     /// # Errors
     /// A tolerance out of range or too fine; no balls, or balls that are not finite.
     pub fn uncovered(&self, balls: &[Sphere], tolerance: f64) -> Result<OneSided, MetricError> {
-        check(balls, tolerance)?;
-        let all = (0..balls.len() as u32).collect();
-        Search::over(self.bounds, all, tolerance)
-            .run(|cube, enough| self.uncovered_in(balls, cube, enough))
+        check_balls(balls, tolerance)?;
+        self.uncovered_by(balls, tolerance)
     }
 
     /// The largest distance from a point of the union of the balls to the solid, as [`Self::uncovered`].
@@ -98,28 +186,61 @@ impl<'a> CoverTest<'a> {
     /// # Errors
     /// As [`Self::uncovered`].
     pub fn overshoot(&self, balls: &[Sphere], tolerance: f64) -> Result<OneSided, MetricError> {
-        check(balls, tolerance)?;
-        let of_ball = |ball: &Sphere| {
+        check_balls(balls, tolerance)?;
+        self.overshoot_of(balls, tolerance)
+    }
+
+    /// [`Self::uncovered`] and [`Self::overshoot`] of the spheres, cones and slabs of a medial mesh.
+    ///
+    /// # Errors
+    /// As [`Self::uncovered`].
+    pub fn of_mesh(&self, mesh: &MedialMesh, tolerance: f64) -> Result<[OneSided; 2], MetricError> {
+        check_tolerance(tolerance)?;
+        MedialUnion::new(mesh)?;
+        let hulls = Hull::of(mesh);
+        Ok([self.uncovered_by(&hulls, tolerance)?, self.overshoot_of(&hulls, tolerance)?])
+    }
+
+    fn uncovered_by(&self, bodies: &[impl Body], tolerance: f64) -> Result<OneSided, MetricError> {
+        let all = (0..bodies.len() as u32).collect();
+        Search::over(self.bounds, all, tolerance)
+            .run(|cube, enough| self.uncovered_in(bodies, cube, enough))
+    }
+
+    fn overshoot_of(&self, bodies: &[impl Body], tolerance: f64) -> Result<OneSided, MetricError> {
+        // The highest point of a ball towards the surface, and bounds over the whole body.
+        let reaches: Vec<_> = bodies.par_iter().map(|body| self.reach(body.balls())).collect();
+        let most: Vec<f64> = reaches.iter().map(|&(most, ..)| most).collect();
+        let all: Vec<u32> =
+            (0..bodies.len() as u32).filter(|&i| most[i as usize] > -ROUNDING).collect();
+        let balls = all.iter().flat_map(|&i| bodies[i as usize].balls());
+        let corners = balls.flat_map(|ball| [ball.centre - ball.radius, ball.centre + ball.radius]);
+        let mut search = Search::over(Bounds::of_points(corners), all.clone(), tolerance);
+        for (_, height, tip) in reaches {
+            search.raise(height, tip);
+        }
+        search.run(|cube, enough| self.overshoot_in(bodies, &most, cube, enough))
+    }
+
+    /// An upper bound on the distance to the solid in the hull of some balls, and a point of it with its distance.
+    fn reach(&self, balls: &[Sphere]) -> (f64, f64, Vec3) {
+        let (mut radius, mut least) = (0.0_f64, f64::INFINITY);
+        let (mut height, mut at) = (f64::NEG_INFINITY, Vec3::ZERO);
+        for ball in balls {
             let closest = self.tree.closest(ball.centre);
             let signed = self.signed(ball.centre, &closest);
             // Towards the closest surface point, a ball that is larger than its depth leaves the solid.
             let outward = (closest.point - ball.centre) * signed.signum() * -1.0;
             let tip = ball.centre + ball.radius * outward.normalize_or(Vec3::X);
-            (ball.radius + signed, self.height(tip), tip)
-        };
-        let reaches: Vec<_> = balls.par_iter().map(of_ball).collect();
-        let most: Vec<f64> = reaches.iter().map(|&(most, ..)| most).collect();
-        let all: Vec<u32> =
-            (0..balls.len() as u32).filter(|&i| most[i as usize] > -ROUNDING).collect();
-        let corners = all.iter().flat_map(|&i| {
-            let Sphere { centre, radius } = balls[i as usize];
-            [centre - radius, centre + radius]
-        });
-        let mut search = Search::over(Bounds::of_points(corners), all.clone(), tolerance);
-        for (_, height, tip) in reaches {
-            search.raise(height, tip);
+            (radius, least) = (radius.max(ball.radius), least.min(signed));
+            let above = self.height(tip);
+            if above > height {
+                (height, at) = (above, tip);
+            }
         }
-        search.run(|cube, enough| self.overshoot_in(balls, &most, cube, enough))
+        let sides = balls.iter().zip(balls.iter().cycle().skip(1));
+        let edge = sides.map(|(a, b)| a.centre.distance(b.centre)).fold(0.0, f64::max);
+        (radius + least + edge, height, at)
     }
 
     /// The signed distance of a point, negative in the solid, by its closest surface point.
@@ -139,14 +260,15 @@ impl<'a> CoverTest<'a> {
         }
     }
 
-    fn uncovered_in(&self, balls: &[Sphere], cube: &Cube, enough: f64) -> Bound {
+    fn uncovered_in<B: Body>(&self, bodies: &[B], cube: &Cube, enough: f64) -> Bound {
         let (q, reach) = (cube.centre, cube.reach());
-        let over = |i: &u32| balls[*i as usize].signed_distance(q);
-        let signed = cube.balls.iter().map(over).fold(f64::INFINITY, f64::min);
+        let over: Vec<f64> =
+            cube.bodies.iter().map(|&i| bodies[i as usize].signed_distance(q)).collect();
+        let signed = over.iter().copied().fold(f64::INFINITY, f64::min);
         let mut upper = signed + reach;
-        for &i in &cube.balls {
-            let Sphere { centre, radius } = balls[i as usize];
-            upper = upper.min(((q - centre).abs() + cube.half).length() - radius);
+        if upper > enough {
+            let most = |&i: &u32| bodies[i as usize].range(q, cube.half)[1];
+            upper = cube.bodies.iter().map(most).fold(upper, f64::min);
         }
         if upper <= enough {
             return Bound::closed(upper);
@@ -157,75 +279,77 @@ impl<'a> CoverTest<'a> {
         if side == Side::Outside && !is_near {
             return Bound::closed(f64::NEG_INFINITY);
         }
-        // The closest point of the surface is in the solid, and the list of balls holds around it.
+        // The closest point of the surface is in the solid, and the list of bodies holds around it.
         let (reached, at) = match side {
             Side::Outside => {
-                let least = |least: f64, &i: &u32| {
-                    least.min(balls[i as usize].signed_distance(closest.point))
-                };
-                (cube.balls.iter().fold(f64::INFINITY, least), closest.point)
+                let at = closest.point;
+                let each = cube.bodies.iter().map(|&i| bodies[i as usize].signed_distance(at));
+                (each.fold(f64::INFINITY, f64::min), at)
             }
             Side::Inside | Side::On => (signed, q),
         };
-        // No ball that is farther than this from `q` is the nearest one within `reach` of it.
-        let list = cube.balls.iter().copied().filter(|i| over(i) <= signed + 2.0 * reach);
-        Bound { reached, at, upper, balls: list.collect() }
+        // No body that is farther than this from `q` is the nearest one within `reach` of it.
+        let list = cube.bodies.iter().zip(over).filter(|(_, over)| *over <= signed + 2.0 * reach);
+        Bound { reached, at, upper, bodies: list.map(|(&i, _)| i).collect() }
     }
 
-    fn overshoot_in(&self, balls: &[Sphere], most: &[f64], cube: &Cube, enough: f64) -> Bound {
+    fn overshoot_in<B: Body>(&self, bodies: &[B], most: &[f64], cube: &Cube, enough: f64) -> Bound {
         let (q, reach) = (cube.centre, cube.reach());
         let meets = |&i: &u32| {
-            let Sphere { centre, radius } = balls[i as usize];
-            let apart = ((q - centre).abs() - cube.half).max(Vec3::ZERO).length();
-            most[i as usize] > enough && apart <= radius + ROUNDING
+            let i = i as usize;
+            most[i] > enough && bodies[i].range(q, cube.half)[0] <= ROUNDING
         };
-        let list: Vec<u32> = cube.balls.iter().copied().filter(meets).collect();
+        let list: Vec<u32> = cube.bodies.iter().copied().filter(meets).collect();
         if list.is_empty() {
-            // Each ball that was dropped here is no farther away from the solid than `enough`.
-            let upper = cube.balls.iter().map(|&i| most[i as usize].min(enough));
+            // Each body that was dropped here is no farther away from the solid than `enough`.
+            let upper = cube.bodies.iter().map(|&i| most[i as usize].min(enough));
             return Bound::closed(upper.fold(f64::NEG_INFINITY, f64::max));
         }
         let closest = self.tree.closest(q);
         let signed = self.signed(q, &closest);
-        let of_balls = list.iter().map(|&i| most[i as usize]).fold(f64::NEG_INFINITY, f64::max);
-        // Dropped balls count as `enough`.
-        let upper = of_balls.min(signed + reach).max(enough.min(signed + reach));
+        let of_bodies = list.iter().map(|&i| most[i as usize]).fold(f64::NEG_INFINITY, f64::max);
+        // Dropped bodies count as `enough`.
+        let upper = of_bodies.min(signed + reach).max(enough.min(signed + reach));
         if upper <= enough {
             return Bound::closed(upper);
         }
         // A point of the union near the centre of the cube.
-        let depth = |i: &&u32| balls[**i as usize].signed_distance(q);
-        let deepest = list.iter().min_by(|i, j| depth(i).total_cmp(&depth(j)));
-        let outside = deepest.map(|&i| balls[i as usize]).filter(|b| b.signed_distance(q) > 0.0);
-        let (reached, at) = match outside {
+        let over = |&i: &u32| (bodies[i as usize].signed_distance(q), i);
+        let deepest = list.iter().map(over).min_by(|a, b| a.0.total_cmp(&b.0));
+        let (reached, at) = match deepest.filter(|&(over, _)| over > 0.0) {
             None => (signed, q),
-            Some(Sphere { centre, radius }) => {
-                let at = centre + radius * (q - centre).normalize_or(Vec3::X);
+            Some((_, i)) => {
+                let at = bodies[i as usize].foot(q);
                 (self.height(at), at)
             }
         };
-        Bound { reached, at, upper, balls: list }
+        Bound { reached, at, upper, bodies: list }
     }
 }
 
 /// # Errors
 /// When there are no balls, one is not finite, or the tolerance is out of range.
-fn check(balls: &[Sphere], tolerance: f64) -> Result<(), MetricError> {
+fn check_balls(balls: &[Sphere], tolerance: f64) -> Result<(), MetricError> {
+    check_tolerance(tolerance)?;
+    MedialUnion::of_spheres(balls)?;
+    Ok(())
+}
+
+/// # Errors
+/// When the tolerance is out of range.
+fn check_tolerance(tolerance: f64) -> Result<(), MetricError> {
     if !(FINEST..=1.0).contains(&tolerance) {
         return Err(MetricError::Tolerance(tolerance));
     }
-    // The checks of a union: there are balls, and all are finite.
-    crate::complex::MedialUnion::of_spheres(balls)
-        .map(drop)
-        .map_err(|error: UnionError| error.into())
+    Ok(())
 }
 
-/// A cube, and the balls that can matter in it.
+/// A cube, and the bodies that can matter in it.
 struct Cube {
     centre: Vec3,
     /// Half of its side.
     half: f64,
-    balls: Vec<u32>,
+    bodies: Vec<u32>,
 }
 
 impl Cube {
@@ -241,14 +365,14 @@ struct Bound {
     reached: f64,
     at: Vec3,
     upper: f64,
-    /// The balls that matter in its eighths.
-    balls: Vec<u32>,
+    /// The bodies that matter in its eighths.
+    bodies: Vec<u32>,
 }
 
 impl Bound {
     /// Of a cube that is not divided.
     fn closed(upper: f64) -> Self {
-        Self { reached: f64::NEG_INFINITY, at: Vec3::ZERO, upper, balls: Vec::new() }
+        Self { reached: f64::NEG_INFINITY, at: Vec3::ZERO, upper, bodies: Vec::new() }
     }
 }
 
@@ -261,12 +385,12 @@ struct Search {
 }
 
 impl Search {
-    fn over(bounds: Bounds, balls: Vec<u32>, tolerance: f64) -> Self {
+    fn over(bounds: Bounds, bodies: Vec<u32>, tolerance: f64) -> Self {
         let mut cubes = Vec::new();
-        if !balls.is_empty() {
+        if !bodies.is_empty() {
             let half = 0.5 * (bounds.hi - bounds.lo).max_element();
             let centre = 0.5 * (bounds.lo + bounds.hi);
-            cubes.push(Cube { centre, half: half * (1.0 + 1e-9), balls });
+            cubes.push(Cube { centre, half: half * (1.0 + 1e-9), bodies });
         }
         Self { cubes, lower: 0.0, witness: None, tolerance }
     }
@@ -305,7 +429,7 @@ impl Search {
                 for octant in 0..8_u32 {
                     let sign = |bit: u32| if octant >> bit & 1 == 1 { half } else { -half };
                     let centre = cube.centre + Vec3::new(sign(0), sign(1), sign(2));
-                    eighths.push(Cube { centre, half, balls: bound.balls.clone() });
+                    eighths.push(Cube { centre, half, bodies: bound.bodies.clone() });
                 }
                 if eighths.len() > MOST {
                     return Err(MetricError::TooFine { tolerance: self.tolerance, pieces: MOST });
@@ -445,6 +569,66 @@ mod tests {
             let at = overshoot.witness.unwrap();
             assert!(sigma(at) < 1e-9 && (test.height(at) - overshoot.lower).abs() < 1e-8);
         }
+    }
+
+    #[test]
+    fn cones_and_slabs_cover_as_their_union_does() {
+        let mut mesh = TriMesh::default();
+        sides(Vec3::new(0.4, 0.2, 0.05), Vec3::ZERO, false, &mut mesh);
+        let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
+        let test = CoverTest::new(&mesh.vertices, &tree, &inside);
+        let mut random = Pcg64::seed_from_u64(7);
+        let mut point =
+            |scale: Vec3| scale * Vec3::from([0; 3].map(|_| random.random_range(-1.0..1.0)));
+        let mut positive = [0; 2];
+        for round in 0..8 {
+            let ball =
+                |_| Sphere::new(point(Vec3::new(0.4, 0.2, 0.03)), 0.02 + 0.004 * round as f64);
+            let spheres = (0..9).map(ball).collect();
+            let (edges, faces) = (vec![[0, 1], [5, 6]], vec![[1, 2, 3], [2, 3, 4], [6, 7, 5]]);
+            let medial = MedialMesh::from_simplices(spheres, edges, faces).unwrap();
+            let union = MedialUnion::new(&medial).unwrap();
+            let intervals = test.of_mesh(&medial, TOLERANCE).unwrap();
+            let mut largest = [0.0_f64; 2];
+            for _ in 0..20_000 {
+                let p = point(Vec3::new(0.5, 0.3, 0.15));
+                let (height, sigma) = (test.height(p), union.signed(p));
+                if height == 0.0 {
+                    largest[0] = largest[0].max(sigma);
+                }
+                if sigma <= 0.0 {
+                    largest[1] = largest[1].max(height);
+                }
+            }
+            for (k, (sampled, interval)) in largest.into_iter().zip(intervals).enumerate() {
+                let OneSided { upper, lower, .. } = interval;
+                assert!(sampled <= upper && sampled > lower - 0.03, "{sampled} {interval:?}");
+                assert!(upper - lower <= TOLERANCE, "{interval:?}");
+                positive[k] += usize::from(lower > 0.0);
+            }
+            let [uncovered, overshoot] = intervals;
+            let at = uncovered.witness.unwrap();
+            assert!(test.height(at) < 1e-9 && (union.signed(at) - uncovered.lower).abs() < 1e-8);
+            if let Some(at) = overshoot.witness {
+                assert!(
+                    union.signed(at) < 1e-9 && (test.height(at) - overshoot.lower).abs() < 1e-8
+                );
+            }
+        }
+        assert!(positive.iter().all(|&count| count > 4), "{positive:?}");
+    }
+
+    #[test]
+    fn a_capsule_is_covered_by_its_cone() {
+        let mesh = cube(0.05);
+        let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
+        let test = CoverTest::new(&mesh.vertices, &tree, &inside);
+        let ends = [-0.05, 0.05].map(|x| Sphere::new(Vec3::new(x, 0.0, 0.0), 0.08));
+        let rod = MedialMesh::from_simplices(ends.to_vec(), vec![[0, 1]], vec![]).unwrap();
+        let [uncovered, overshoot] = test.of_mesh(&rod, TOLERANCE).unwrap();
+        assert_eq!(uncovered.upper, 0.0);
+        holds(overshoot, 0.08);
+        assert!(test.uncovered(&ends, TOLERANCE).unwrap().lower > 0.0);
     }
 
     #[test]

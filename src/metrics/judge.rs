@@ -9,19 +9,21 @@ use super::hausdorff::distances_with_envelope;
 use super::samples::{Pose, SurfaceSamples};
 use super::spikes::{centres_outside, protrusion};
 use super::structure::{Structure, StructureSurface};
-use super::volume::{Sides, box_in, volume_error_in};
+use super::volume::{Sides, Volumes, box_in, volumes_in};
 use super::{
     AxisOptions, Certificate, CoverTest, DistanceOptions, EnvelopeOptions, MetricError, OneSided,
     ROUNDING, VolumeOptions, certify, sample_envelope, spikes, topology_warning,
 };
 use crate::Vec3;
 use crate::complex::{Incidence, MedialMesh, MedialUnion, ZERO_LENGTH, betti, euler};
-use crate::geometry::Sphere;
 use crate::surface::{InsideTest, Side, SignedDistance, TriMesh, TriangleBvh};
 
 /// Mean error from which radii that do not fit the surface cause a warning. A result with a smaller
 /// error is right, for any radii.
 const LARGE_MEAN: f64 = 0.005;
+
+/// Width of the intervals of one-sided errors where none is requested.
+const COVER_TOLERANCE: f64 = 1e-3;
 
 /// For centres closer to the surface than this the ratio of radius to distance means nothing.
 const ON_SURFACE: f64 = 1e-6;
@@ -104,7 +106,7 @@ impl Judge {
         let (mesh, union) = &samples.ordered(mesh)?;
         let options = self.distance_options();
         // In parallel with each other, because each has serial parts.
-        let ((distances, volume_error), (axis, (quality, spikes, betti, structure))) = rayon::join(
+        let ((distances, volumes), (axis, (quality, spikes, betti, structure))) = rayon::join(
             || {
                 rayon::join(
                     || {
@@ -116,7 +118,7 @@ impl Judge {
                             &options,
                         )
                     },
-                    || self.volume_error(mesh, union, &samples.pose),
+                    || self.volumes(mesh, union, &samples.pose),
                 )
             },
             || {
@@ -135,7 +137,7 @@ impl Judge {
         if mesh.spheres.len() == 1 || !mesh.edges.is_empty() {
             warnings.extend(topology_warning(betti, self.truth.betti));
         }
-        let volume_error = match volume_error {
+        let volumes = match volumes {
             // The surface was accepted as a solid, and all other measures are defined.
             Err(MetricError::NoVolume(volume)) => {
                 warnings.push(format!(
@@ -150,7 +152,9 @@ impl Judge {
             warnings,
             distances,
             certified: None,
-            volume_error,
+            cover: None,
+            volume_error: volumes.map(|volumes| volumes.error),
+            volume_ratio: volumes.map(|volumes| volumes.ratio),
             protrusion: Some(protrusion(&envelope, &self.inside)),
             centres_outside: Some(centres_outside(mesh, &self.inside)),
             quality,
@@ -200,18 +204,48 @@ impl Judge {
         certify(&self.surface, &self.tree, &mesh, tolerance)
     }
 
-    /// The one-sided errors of the spheres of a medial mesh alone, each in an interval no wider than
-    /// `tolerance`, as fractions of the diagonal.
+    /// [`Judge::evaluate`], with the intervals of [`Judge::certify`] and [`Judge::cover`] of the width `certify`.
+    /// Spheres without edges get those of [`Judge::cover`] without it, 0.001 wide.
     ///
     /// # Errors
     /// As [`Judge::certify`].
-    pub fn cover(&self, spheres: &[Sphere], tolerance: f64) -> Result<Cover, MetricError> {
+    pub fn evaluate_certified(
+        &self,
+        mesh: &MedialMesh,
+        certify: Option<f64>,
+    ) -> Result<Evaluation, MetricError> {
+        let mut evaluation = self.evaluate(mesh)?;
+        match certify {
+            Some(tolerance) => {
+                evaluation.certified = Some(self.certify(mesh, tolerance)?);
+                evaluation.cover = Some(self.cover(mesh, tolerance)?);
+            }
+            // The other measures hold without them, as of spheres in other units.
+            None if mesh.edges.is_empty() => match self.cover(mesh, COVER_TOLERANCE) {
+                Ok(cover) => evaluation.cover = Some(cover),
+                Err(error) => evaluation.warnings.push(format!("no one-sided errors: {error}")),
+            },
+            None => {}
+        }
+        Ok(evaluation)
+    }
+
+    /// The one-sided errors of a medial mesh, each in an interval no wider than `tolerance`, as fractions of the
+    /// diagonal.
+    ///
+    /// # Errors
+    /// As [`Judge::certify`].
+    pub fn cover(&self, mesh: &MedialMesh, tolerance: f64) -> Result<Cover, MetricError> {
         let samples = self.samples()?;
+        let (mesh, union) = samples.ordered(mesh)?;
         let test = CoverTest::new(&self.surface.vertices, &self.tree, &self.inside);
-        let (uncovered, overshoot) =
-            (test.uncovered(spheres, tolerance)?, test.overshoot(spheres, tolerance)?);
-        let mesh = MedialMesh { spheres: spheres.to_vec(), ..MedialMesh::default() };
-        let union = MedialUnion::of_spheres(spheres)?;
+        let [uncovered, overshoot] = match mesh.edges.is_empty() {
+            true => [
+                test.uncovered(&mesh.spheres, tolerance)?,
+                test.overshoot(&mesh.spheres, tolerance)?,
+            ],
+            false => test.of_mesh(&mesh, tolerance)?,
+        };
         let uncovered_at = union.signed_batch(&samples.points[..samples.uniform]);
         let options = EnvelopeOptions {
             samples: self.options.samples,
@@ -228,12 +262,12 @@ impl Judge {
         })
     }
 
-    fn volume_error(
+    fn volumes(
         &self,
         mesh: &MedialMesh,
         union: &MedialUnion,
         pose: &Pose,
-    ) -> Result<Option<f64>, MetricError> {
+    ) -> Result<Option<Volumes>, MetricError> {
         if self.options.volume_depth == 0 {
             return Ok(None);
         }
@@ -245,7 +279,7 @@ impl Judge {
             inside: |p| self.inside.side(p) == Side::Inside,
         };
         let bounds = box_in(pose, &self.surface, &mesh.spheres);
-        volume_error_in(pose, bounds, &sides, &options).map(Some)
+        volumes_in(pose, bounds, &sides, &options).map(Some)
     }
 
     fn structure(&self, mesh: &MedialMesh, betti: [u64; 3]) -> Result<Structure, MetricError> {
@@ -347,8 +381,14 @@ pub struct Evaluation {
     /// An interval that contains the Hausdorff distance, if it was requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certified: Option<Certificate>,
+    /// One-sided errors: of spheres without edges, and of every medial mesh with a certificate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cover: Option<Cover>,
     /// Volume of the symmetric difference of solid and union, over the solid's volume.
     pub volume_error: Option<f64>,
+    /// Volume of the union over the solid's volume.
+    #[serde(default)]
+    pub volume_ratio: Option<f64>,
     /// Largest distance from the surface of a boundary point of the union that is outside the solid.
     #[serde(default)]
     pub protrusion: Option<f64>,
@@ -381,12 +421,25 @@ pub struct Evaluation {
     pub warnings: Vec<String>,
 }
 
-/// One-sided errors of spheres alone against a solid, as fractions of the diagonal.
+impl Evaluation {
+    /// Maps the witnesses of all intervals, as to the units of the input.
+    pub fn move_witnesses(&mut self, map: impl Fn(Vec3) -> Vec3) {
+        if let Some(certified) = &mut self.certified {
+            certified.witness.point = map(certified.witness.point);
+        }
+        if let Some(cover) = &mut self.cover {
+            cover.uncovered.witness = cover.uncovered.witness.map(&map);
+            cover.overshoot.witness = cover.overshoot.witness.map(&map);
+        }
+    }
+}
+
+/// One-sided errors against a solid, as fractions of the diagonal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cover {
-    /// Largest distance from a point of the solid, boundary and interior, to the union of the balls.
+    /// Largest distance from a point of the solid, boundary and interior, to the union.
     pub uncovered: OneSided,
-    /// Largest distance from a point of the union of the balls to the solid.
+    /// Largest distance from a point of the union to the solid.
     pub overshoot: OneSided,
     /// Distances to the union over the area of the surface; covered points count as 0.
     pub uncovered_over_surface: MeanAndP95,

@@ -78,7 +78,16 @@ pub fn volume_error(
         bounds = (bounds.0.min(lo), bounds.1.max(hi));
     }
     let sides = Sides { surface, bvh, union, inside };
-    volume_error_in(&Pose::coordinates(), bounds, &sides, options)
+    Ok(volumes_in(&Pose::coordinates(), bounds, &sides, options)?.error)
+}
+
+/// Volumes relative to that of the solid.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Volumes {
+    /// Of the symmetric difference of solid and union.
+    pub error: f64,
+    /// Of the union.
+    pub ratio: f64,
 }
 
 /// The box around a surface and balls in the coordinates of a pose.
@@ -100,12 +109,12 @@ pub(super) struct Sides<'a, F> {
 }
 
 /// As [`volume_error`], by cells along the axes of `pose` in the box `bounds` of its coordinates.
-pub(super) fn volume_error_in(
+pub(super) fn volumes_in(
     pose: &Pose,
     bounds: (Vec3, Vec3),
     sides: &Sides<'_, impl Fn(Vec3) -> bool + Sync>,
     options: &VolumeOptions,
-) -> Result<f64, MetricError> {
+) -> Result<Volumes, MetricError> {
     let volume = enclosed_volume(sides.surface);
     if !(volume > 0.0 && volume.is_finite()) {
         return Err(MetricError::NoVolume(volume));
@@ -115,8 +124,9 @@ pub(super) fn volume_error_in(
     let root = Cell { lo, size: hi - lo, level: 0, path: 1 };
     let coarse = (0..options.depth.min(COARSE))
         .fold(vec![root], |cells, _| cells.iter().flat_map(Cell::children).collect());
-    let parts: Vec<f64> = coarse.par_iter().map(|cell| division.difference(cell)).collect();
-    Ok(parts.iter().sum::<f64>() / volume)
+    let parts: Vec<Parts> = coarse.par_iter().map(|cell| division.difference(cell)).collect();
+    let Parts { all, excess } = parts.into_iter().fold(Parts::default(), Parts::plus);
+    Ok(Volumes { error: all / volume, ratio: 1.0 + (2.0 * excess - all) / volume })
 }
 
 #[derive(Clone, Copy)]
@@ -138,8 +148,28 @@ impl Cell {
         })
     }
 
-    fn volume(&self) -> f64 {
-        self.size.x * self.size.y * self.size.z
+    /// The cell as a part of the difference, if it is in one of both alone.
+    fn part(&self, in_solid: bool, in_union: bool) -> Parts {
+        let volume = self.size.x * self.size.y * self.size.z;
+        match (in_solid, in_union) {
+            (true, false) => Parts { all: volume, excess: 0.0 },
+            (false, true) => Parts { all: volume, excess: volume },
+            _ => Parts::default(),
+        }
+    }
+}
+
+/// Volumes in the difference of solid and union.
+#[derive(Clone, Copy, Debug, Default)]
+struct Parts {
+    all: f64,
+    /// The part in the union.
+    excess: f64,
+}
+
+impl Parts {
+    fn plus(self, other: Self) -> Self {
+        Self { all: self.all + other.all, excess: self.excess + other.excess }
     }
 }
 
@@ -151,8 +181,8 @@ struct Division<'a, F> {
 }
 
 impl<F: Fn(Vec3) -> bool> Division<'_, F> {
-    /// Volume of the part of the difference in a cell.
-    fn difference(&self, cell: &Cell) -> f64 {
+    /// The part of the difference in a cell.
+    fn difference(&self, cell: &Cell) -> Parts {
         let Sides { bvh, union, inside, .. } = self.sides;
         if cell.level >= self.depth {
             // A generator per cell: whether a boundary just touches another cell is up to rounding,
@@ -160,8 +190,7 @@ impl<F: Fn(Vec3) -> bool> Division<'_, F> {
             let mut rng = Pcg64::seed_from_u64(splitmix(self.seed) ^ cell.path);
             let jitter = Vec3::new(rng.random(), rng.random(), rng.random());
             let point = self.pose.world(cell.lo + jitter * cell.size);
-            let differs = inside(point) != union.buries(point, 0.0);
-            return if differs { cell.volume() } else { 0.0 };
+            return cell.part(inside(point), union.buries(point, 0.0));
         }
         let (centre, reach) = (cell.lo + cell.size * 0.5, cell.size.length() * 0.5);
         let centre = self.pose.world(centre);
@@ -170,10 +199,10 @@ impl<F: Fn(Vec3) -> bool> Division<'_, F> {
         if !bvh.any_within(centre, reach) {
             let covered = union.buries(centre, reach);
             if covered || !union.buries(centre, -reach) {
-                let differs = inside(centre) != covered;
-                return if differs { cell.volume() } else { 0.0 };
+                return cell.part(inside(centre), covered);
             }
         }
-        cell.children().iter().map(|child| self.difference(child)).sum()
+        let parts = cell.children().map(|child| self.difference(&child));
+        parts.into_iter().fold(Parts::default(), Parts::plus)
     }
 }

@@ -108,7 +108,9 @@ fn evaluation(error: f64, wobble: f64, count: usize, rank: usize) -> Evaluation 
             reverse_samples: 48_000,
         },
         certified: None,
+        cover: None,
         volume_error: Some(error),
+        volume_ratio: None,
         protrusion: Some(error * 0.7),
         centres_outside: Some(0.0),
         quality: TriangleQuality {
