@@ -254,10 +254,8 @@ fn ratio(entries: &[&Entry<'_>], reference: &[&Entry<'_>]) -> Option<Ratio> {
 
 /// Results with the solid's Betti numbers, and results where both are known.
 pub(crate) fn topology(entries: &[&Entry<'_>]) -> (usize, usize) {
-    let known = entries.iter().filter_map(|entry| {
-        let evaluation = entry.record.evaluate.as_ref()?;
-        Some(evaluation.betti == evaluation.expected_betti?)
-    });
+    let known =
+        entries.iter().filter_map(|entry| entry.record.evaluate.as_ref()?.has_right_topology());
     known.fold((0, 0), |(right, all), same| (right + usize::from(same), all + 1))
 }
 

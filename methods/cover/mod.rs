@@ -34,7 +34,8 @@
 //! 4. *Swaps*: the sphere that matters least moves to the point with the largest gap.
 //! 5. *Rounds*: the descent sees all points with a large gap, and a part of the others, selected again and
 //!    again; the witness of the certificate joins them.
-//! 6. *Proof*: the upper end of the certified interval of `G` ([`CoverTest::uncovered`]) decides the radii.
+//! 6. *Proof*: the upper end of the certified interval of `G` ([`CoverTest::uncovered`]) decides the radii. With
+//!    `mood=outside` a margin is added to them, and doubled twice until the interval of the spheres ends at 0.
 //!
 //! With `radii=equal` the depth in `f_c` is that of the least deep centre, and `G` the covering radius of
 //! the centres less that depth. Candidates and steps are restricted to centres of at least a common depth, which is
@@ -85,6 +86,9 @@ const ROUGH: f64 = 0.1;
 /// Width of the certified interval of `G`, as a share of it.
 const WIDTH: f64 = 0.005;
 
+/// Width of the certified interval that proves cover.
+const PROOF_WIDTH: f64 = 1e-3;
+
 /// Narrower intervals than this, in diagonals, are not worth their cost, and the first one has the other width.
 const LEAST_WIDTH: f64 = 1e-5;
 const ROUGH_FIRST: f64 = 0.01;
@@ -92,8 +96,11 @@ const ROUGH_FIRST: f64 = 0.01;
 /// Radii are smaller than the depth by this, in diagonals, so that files keep them inside.
 const WITHIN: f64 = 1e-7;
 
-/// Radii are larger by this, in diagonals: a certificate of cover needs a margin.
+/// Radii are larger by this share of the error, and at least by this, in diagonals: a certificate of cover needs a
+/// margin, and takes the time of its inverse. Where it fails, the margin is multiplied by the third.
+const BEYOND_SHARE: f64 = 0.005;
 const BEYOND: f64 = 1e-5;
+const BEYOND_FACTOR: f64 = 4.0;
 
 /// Spheres that cover, as a method.
 ///
@@ -146,17 +153,6 @@ pub enum Mood {
     Inside,
 }
 
-impl Mood {
-    /// The certified error of the side, or sides, on which spheres of this mood deviate.
-    fn error(self, gap: OneSided) -> f64 {
-        match self {
-            Self::Balanced => 0.5 * gap.upper,
-            Self::Outside => gap.upper + BEYOND,
-            Self::Inside => gap.upper + WITHIN,
-        }
-    }
-}
-
 fn prepare<'s>(shape: &'s Shape, params: CoverParams, run: &RunContext) -> Prepared<'s> {
     if shape.has_given_initial() {
         let why = "it starts from no medial mesh: leave out --initial";
@@ -185,7 +181,8 @@ impl Simplification for PreparedCover<'_> {
         };
         let mut diagnostics = Diagnostics::default();
         let (placed, gap) = self.placed(count, &mut diagnostics)?;
-        self.finished(level, &placed, gap, diagnostics)
+        let error = self.error(&placed, gap)?;
+        self.finished(level, &placed, error, diagnostics)
     }
 }
 
@@ -264,23 +261,40 @@ impl PreparedCover<'_> {
         Ok((balls, gap))
     }
 
-    /// Step 6.
+    /// Step 6: the certified error of the side, or sides, on which spheres of the mood deviate.
+    fn error(&self, inner: &[Sphere], gap: OneSided) -> Result<f64> {
+        Ok(match self.params.mood {
+            Mood::Balanced => 0.5 * gap.upper,
+            Mood::Outside => self.proven(inner, gap)?,
+            Mood::Inside => gap.upper + WITHIN,
+        })
+    }
+
     fn finished(
         &self,
         level: Level,
         inner: &[Sphere],
-        gap: OneSided,
+        error: f64,
         diagnostics: Diagnostics,
     ) -> Result<Simplified> {
-        let mood = self.params.mood;
-        let added = match mood {
-            Mood::Inside => -WITHIN,
-            Mood::Outside => gap.upper + BEYOND,
-            Mood::Balanced => 0.5 * gap.upper,
-        };
-        let spheres = inner.iter().map(|ball| Sphere::new(ball.centre, ball.radius + added));
-        let mesh = MedialMesh::from_simplices(spheres.collect(), vec![], vec![])?;
-        checked(level, mesh, Some(mood.error(gap)), diagnostics)
+        let added = if self.params.mood == Mood::Inside { -WITHIN } else { error };
+        let mesh = MedialMesh::from_simplices(grown(inner, added), vec![], vec![])?;
+        checked(level, mesh, Some(error), diagnostics)
+    }
+
+    /// The radius to add to inner balls, with which a certificate proves that they contain the solid.
+    fn proven(&self, inner: &[Sphere], gap: OneSided) -> Result<f64> {
+        let mut margin = (BEYOND_SHARE * gap.upper).max(BEYOND);
+        loop {
+            let balls = grown(inner, gap.upper + margin);
+            let uncovered = self.test().uncovered(&balls, PROOF_WIDTH).map_err(failed)?;
+            // With a margin of the solid's size there is nothing to prove.
+            if uncovered.upper == 0.0 || margin > 1.0 {
+                return Ok(gap.upper + margin);
+            }
+            self.run.step(0, 1)?;
+            margin *= BEYOND_FACTOR;
+        }
     }
 
     /// The level by error: the fewest spheres that a search over their number finds within it.
@@ -299,11 +313,11 @@ impl PreparedCover<'_> {
             count = count.clamp(missed + 1, MOST);
             let mut diagnostics = Diagnostics::default();
             let (balls, gap) = self.placed(count, &mut diagnostics)?;
-            let (spheres, error) = (balls.len(), mood.error(gap));
+            let (spheres, error) = (balls.len(), self.error(&balls, gap)?);
             least = least.min(error);
             let times = (error / bound).powf(MORE);
             if error <= bound {
-                held = Some((balls, gap, diagnostics));
+                held = Some((balls, error, diagnostics));
                 count = (spheres as f64 * times).floor() as usize;
                 count = count.clamp(missed + 1, (spheres - 1).max(missed + 1));
             } else {
@@ -320,12 +334,12 @@ impl PreparedCover<'_> {
                 break;
             }
         }
-        let Some((balls, gap, diagnostics)) = held else {
+        let Some((balls, error, diagnostics)) = held else {
             return Err(SimplifyError::Level(format!(
                 "no {MOST} spheres are within {bound} of the diagonal: the least error was {least:.3e}"
             )));
         };
-        self.finished(Level::Native(bound), &balls, gap, diagnostics)
+        self.finished(Level::Native(bound), &balls, error, diagnostics)
     }
 }
 
@@ -337,6 +351,10 @@ const MORE: f64 = 1.3;
 /// Counts that the search for an error tries, and the part of a count that it does not resolve.
 const TRIALS: usize = 6;
 const CLOSE: usize = 24;
+
+fn grown(balls: &[Sphere], by: f64) -> Vec<Sphere> {
+    balls.iter().map(|ball| Sphere::new(ball.centre, ball.radius + by)).collect()
+}
 
 fn failed(error: MetricError) -> SimplifyError {
     SimplifyError::Failed(error.to_string())

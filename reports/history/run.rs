@@ -15,6 +15,7 @@ use crate::journal::{check_regular, replace_file};
 use crate::metric::median;
 use crate::record::{Machine, Record, Stages, Status};
 use crate::text::printable;
+use medial::metrics::Evaluation;
 
 /// Why a run cannot be stored, or a history cannot be read: the file or option, and its problem.
 #[derive(Debug, thiserror::Error)]
@@ -210,7 +211,7 @@ impl Point {
             hausdorff: evaluation.and_then(|e| rounded(e.distances.hausdorff, 6)),
             mean: evaluation.and_then(|e| rounded(e.distances.mean, 6)),
             spheres: record.simplify.spheres.map(|spheres| spheres as u64),
-            topology: evaluation.and_then(|e| Some(e.betti == e.expected_betti?)),
+            topology: evaluation.and_then(Evaluation::has_right_topology),
             result: record.result_hash.as_deref().map(first_digits),
         }
     }

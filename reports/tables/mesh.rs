@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use medial::metrics::Evaluation;
+
 use crate::comparison::{Comparison, Entry, RISING, RISING_NOTE, level_label, reached};
 use crate::metric::{COMPARED, HAUSDORFF, Metric};
 use crate::summary::pick;
@@ -41,9 +43,9 @@ impl Best {
 /// Whether the Betti numbers are the solid's: `yes`, `no`, or a dash where one is unknown.
 pub(crate) fn topology_word(entry: &Entry<'_>) -> &'static str {
     let evaluation = entry.record.evaluate.as_ref();
-    match evaluation.and_then(|e| Some((e.betti, e.expected_betti?))) {
-        Some((found, expected)) if found == expected => "yes",
-        Some(_) => "no",
+    match evaluation.and_then(Evaluation::has_right_topology) {
+        Some(true) => "yes",
+        Some(false) => "no",
         None => "–",
     }
 }

@@ -1,7 +1,7 @@
 //! Tables of further metrics of each method's results at each number of spheres: structure and cover.
 
 use crate::comparison::{Comparison, Entry};
-use crate::metric::{COVER, Metric, STRUCTURE, median};
+use crate::metric::{Better, COVER, Metric, STRUCTURE, median};
 use crate::summary::pick;
 use crate::tables::{Cell, Table};
 use crate::text::grouped;
@@ -22,8 +22,8 @@ const STRUCTURE_TABLE: Topic = Topic {
 const COVER_TABLE: Topic = Topic {
     caption: "Cover: one-sided errors of spheres",
     metrics: &COVER,
-    note: "Results without edges: `--spheres-alone` drops the edges of all results. Both distances are upper ends of \
-           certified intervals, so 0 is a proof: `uncovered` 0 encloses the solid, `overshoot` 0 stays within it.",
+    note: "Of results without edges, of all results with --spheres-alone or --certify. Both distances are upper ends of \
+           certified intervals, so 0 is a proof: the spheres enclose the solid (uncovered) or stay within it (overshoot).",
 };
 
 /// The tables of structure and cover, without those of which nothing was measured. `how` has the command line and version
@@ -39,10 +39,11 @@ impl Topic {
         for (level, count) in comparison.counts() {
             for series in 0..comparison.series.len() {
                 let mut entries = comparison.at(series, level);
-                let has_first = |entry: &&Entry<'_>| {
-                    self.metrics.iter().any(|metric| metric.of(entry.record).is_some())
-                };
-                entries.retain(|entry| entry.comparable() && has_first(entry));
+                // Sizes are known of every result.
+                let ranked = || self.metrics.iter().filter(|m| m.better != Better::Neither);
+                let is_measured =
+                    |entry: &Entry<'_>| ranked().any(|m| m.of(entry.record).is_some());
+                entries.retain(|entry| entry.comparable() && is_measured(entry));
                 if !entries.is_empty() {
                     items.push((count, series, entries));
                 }
@@ -61,7 +62,8 @@ impl Topic {
                 let best = others.filter_map(|(.., entries)| value(metric, entries));
                 let best = best.reduce(|a, b| pick(metric, a, b));
                 let text = metric.format(own);
-                Cell { best: best.is_some_and(|best| metric.format(best) == text), text }
+                let is_best = best.is_some_and(|best| metric.format(best) == text);
+                Cell { best: is_best && metric.better != Better::Neither, text }
             });
         }
         let table = rows.number("meshes", |(.., entries)| entries.len().to_string()).table;

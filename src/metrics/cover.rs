@@ -1,7 +1,7 @@
 //! One-sided errors of a union of balls, or of a medial mesh, against a solid, each in a certified interval.
 //!
-//! With the solid K, bounded by a closed surface, the union U of some balls and hulls of two or three balls,
-//! and `sigma(p)` the least signed distance to one of them:
+//! With the solid K, bounded by a closed surface, the union U of balls, cones and slabs, and the least
+//! signed distance `sigma(p)` to one of them:
 //!
 //! - `uncovered` is the largest `sigma(p)` over K, boundary and interior, and 0 if it is negative: the
 //!   distance from U to the farthest point of the solid outside it;
@@ -10,26 +10,24 @@
 //! Unlike the two sides of [`certify`](super::certify), which measure boundaries, neither counts a
 //! point that is in both, and `uncovered` sees holes of U inside the solid.
 //!
-//! Both are found by branch and bound over cubes. Each cube has the list of the bodies that can matter
+//! Both are found by branch and bound over cubes. Each cube has the list of the balls that can matter
 //! in it, which its eighths inherit. With the centre `q` and half diagonal `h` of a cube:
 //!
 //! 1. Over a cube, the signed distance to one ball is largest at the corner farthest from its centre.
-//!    So the least of these bounds `sigma` from above, and a cube in one ball is covered. The signed
-//!    distance to a hull exceeds that at `q` by at most `h`.
+//!    So the least of these bounds `sigma` from above, and a cube in one ball is covered.
 //! 2. A cube is outside K, or within it, if `q` is and the surface is farther away than `h`.
 //! 3. A ball with its centre at the signed distance `s` from K (negative inside) is nowhere farther
 //!    from K than `r + s`, since the distance to K is 1-Lipschitz and a ball of radius `-s` fits into K.
 //!    So balls with `r <= -s` need no search, and the others bound the overshoot in the cubes they meet.
-//!    The centres of a hull lie within its longest edge of each corner, so with the largest `r`, the least
-//!    `s` and the edge's length the same holds for a hull.
-//! 4. Everything else is bounded by distances being 1-Lipschitz.
+//! 4. Everything else is bounded by distances being 1-Lipschitz. For cones and slabs this is the only
+//!    bound, and `sigma` comes from the tree of [`MedialUnion`] in place of lists.
 //!
 //! All cubes of one size are evaluated in one round, so the result is the same for any number of
 //! threads.
 //!
 //! # Proof of zero
 //!
-//! An upper end of exactly 0 is a proof: every cube is in one body or outside K, or every body in K,
+//! An upper end of exactly 0 is a proof: every cube is in one ball or outside K, or every ball in K,
 //! by more than [`ROUNDING`]. Cubes are divided beyond the tolerance for it, to a half diagonal of
 //! [`SMALLEST`]: where the margin is smaller than about that, the interval ends at a positive number.
 
@@ -38,9 +36,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{FINEST, MetricError, ROUNDING};
 use crate::Vec3;
-use crate::complex::{MedialMesh, MedialUnion};
+use crate::complex::{MedialUnion, UnionError};
+use crate::geometry::Sphere;
 use crate::geometry::trees::Bounds;
-use crate::geometry::{Cone, Slab, Sphere};
 use crate::surface::{Closest, InsideTest, Side, TriangleBvh};
 
 /// Half diagonal of the smallest cubes that a proof of zero divides, in diagonals of the surface.
@@ -48,6 +46,9 @@ pub const SMALLEST: f64 = 1e-6;
 
 /// Cubes of a round up to which a proof of zero goes on.
 const MOST_FOR_ZERO: usize = 1 << 19;
+
+/// The same for a medial mesh, which seldom contains a solid or fits into it.
+const MOST_FOR_ZERO_OF_MESH: usize = 1 << 16;
 
 /// Cubes of a round at most: about 1 GB.
 const MOST: usize = 1 << 22;
@@ -65,93 +66,6 @@ pub struct OneSided {
     /// A point at which the distance is `lower`, up to rounding; absent if `lower` is 0.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub witness: Option<Vec3>,
-}
-
-/// A convex body: a ball, or the hull of two or three balls.
-trait Body: Sync {
-    /// The balls that span it.
-    fn balls(&self) -> &[Sphere];
-
-    /// Signed distance, negative inside.
-    fn signed_distance(&self, p: Vec3) -> f64;
-
-    /// The boundary point nearest to a point outside.
-    fn foot(&self, p: Vec3) -> Vec3;
-
-    /// Bounds on the signed distance over a cube from below and above.
-    fn range(&self, q: Vec3, half: f64) -> [f64; 2] {
-        let (signed, reach) = (self.signed_distance(q), HALF_DIAGONAL * half);
-        [signed - reach, signed + reach]
-    }
-}
-
-impl Body for Sphere {
-    fn balls(&self) -> &[Sphere] {
-        std::slice::from_ref(self)
-    }
-
-    fn signed_distance(&self, p: Vec3) -> f64 {
-        Self::signed_distance(self, p)
-    }
-
-    fn foot(&self, p: Vec3) -> Vec3 {
-        self.centre + self.radius * (p - self.centre).normalize_or(Vec3::X)
-    }
-
-    fn range(&self, q: Vec3, half: f64) -> [f64; 2] {
-        let apart = (q - self.centre).abs();
-        let nearest = (apart - half).max(Vec3::ZERO).length();
-        [nearest - self.radius, (apart + half).length() - self.radius]
-    }
-}
-
-/// The body of a simplex of a medial mesh.
-enum Hull {
-    Ball(Sphere),
-    Cone([Sphere; 2], Cone),
-    Slab([Sphere; 3], Box<Slab>),
-}
-
-impl Hull {
-    /// The bodies of a medial mesh, without those in a larger simplex.
-    fn of(mesh: &MedialMesh) -> Vec<Self> {
-        let faces = mesh.faces.iter().map(|&face| {
-            let balls = mesh.spheres_of(face);
-            Self::Slab(balls, Box::new(Slab::new(balls)))
-        });
-        let edges = mesh.lone_edges().into_iter().map(|edge| {
-            let balls @ [a, b] = mesh.spheres_of(edge);
-            Self::Cone(balls, Cone::new(a, b))
-        });
-        let lone = mesh.isolated().into_iter().map(|v| Self::Ball(mesh.spheres[v as usize]));
-        faces.chain(edges).chain(lone).collect()
-    }
-}
-
-impl Body for Hull {
-    fn balls(&self) -> &[Sphere] {
-        match self {
-            Self::Ball(ball) => ball.balls(),
-            Self::Cone(balls, _) => balls,
-            Self::Slab(balls, _) => &balls[..],
-        }
-    }
-
-    fn signed_distance(&self, p: Vec3) -> f64 {
-        match self {
-            Self::Ball(ball) => ball.signed_distance(p),
-            Self::Cone(_, cone) => cone.signed_distance(p),
-            Self::Slab(_, slab) => slab.signed_distance(p),
-        }
-    }
-
-    fn foot(&self, p: Vec3) -> Vec3 {
-        match self {
-            Self::Ball(ball) => Body::foot(ball, p),
-            Self::Cone(_, cone) => cone.foot(p).point,
-            Self::Slab(_, slab) => slab.foot(p).point,
-        }
-    }
 }
 
 /// A solid that unions of balls are measured against: the tree and the inside test of one closed,
@@ -177,8 +91,10 @@ impl<'a> CoverTest<'a> {
     /// # Errors
     /// A tolerance out of range or too fine; no balls, or balls that are not finite.
     pub fn uncovered(&self, balls: &[Sphere], tolerance: f64) -> Result<OneSided, MetricError> {
-        check_balls(balls, tolerance)?;
-        self.uncovered_by(balls, tolerance)
+        check(balls, tolerance)?;
+        let all = (0..balls.len() as u32).collect();
+        Search::over(self.bounds, all, tolerance)
+            .run(|cube, enough| self.uncovered_in(balls, cube, enough))
     }
 
     /// The largest distance from a point of the union of the balls to the solid, as [`Self::uncovered`].
@@ -186,61 +102,84 @@ impl<'a> CoverTest<'a> {
     /// # Errors
     /// As [`Self::uncovered`].
     pub fn overshoot(&self, balls: &[Sphere], tolerance: f64) -> Result<OneSided, MetricError> {
-        check_balls(balls, tolerance)?;
-        self.overshoot_of(balls, tolerance)
-    }
-
-    /// [`Self::uncovered`] and [`Self::overshoot`] of the spheres, cones and slabs of a medial mesh.
-    ///
-    /// # Errors
-    /// As [`Self::uncovered`].
-    pub fn of_mesh(&self, mesh: &MedialMesh, tolerance: f64) -> Result<[OneSided; 2], MetricError> {
-        check_tolerance(tolerance)?;
-        MedialUnion::new(mesh)?;
-        let hulls = Hull::of(mesh);
-        Ok([self.uncovered_by(&hulls, tolerance)?, self.overshoot_of(&hulls, tolerance)?])
-    }
-
-    fn uncovered_by(&self, bodies: &[impl Body], tolerance: f64) -> Result<OneSided, MetricError> {
-        let all = (0..bodies.len() as u32).collect();
-        Search::over(self.bounds, all, tolerance)
-            .run(|cube, enough| self.uncovered_in(bodies, cube, enough))
-    }
-
-    fn overshoot_of(&self, bodies: &[impl Body], tolerance: f64) -> Result<OneSided, MetricError> {
-        // The highest point of a ball towards the surface, and bounds over the whole body.
-        let reaches: Vec<_> = bodies.par_iter().map(|body| self.reach(body.balls())).collect();
-        let most: Vec<f64> = reaches.iter().map(|&(most, ..)| most).collect();
-        let all: Vec<u32> =
-            (0..bodies.len() as u32).filter(|&i| most[i as usize] > -ROUNDING).collect();
-        let balls = all.iter().flat_map(|&i| bodies[i as usize].balls());
-        let corners = balls.flat_map(|ball| [ball.centre - ball.radius, ball.centre + ball.radius]);
-        let mut search = Search::over(Bounds::of_points(corners), all.clone(), tolerance);
-        for (_, height, tip) in reaches {
-            search.raise(height, tip);
-        }
-        search.run(|cube, enough| self.overshoot_in(bodies, &most, cube, enough))
-    }
-
-    /// An upper bound on the distance to the solid in the hull of some balls, and a point of it with its distance.
-    fn reach(&self, balls: &[Sphere]) -> (f64, f64, Vec3) {
-        let (mut radius, mut least) = (0.0_f64, f64::INFINITY);
-        let (mut height, mut at) = (f64::NEG_INFINITY, Vec3::ZERO);
-        for ball in balls {
+        check(balls, tolerance)?;
+        let of_ball = |ball: &Sphere| {
             let closest = self.tree.closest(ball.centre);
             let signed = self.signed(ball.centre, &closest);
             // Towards the closest surface point, a ball that is larger than its depth leaves the solid.
             let outward = (closest.point - ball.centre) * signed.signum() * -1.0;
             let tip = ball.centre + ball.radius * outward.normalize_or(Vec3::X);
-            (radius, least) = (radius.max(ball.radius), least.min(signed));
-            let above = self.height(tip);
-            if above > height {
-                (height, at) = (above, tip);
-            }
+            (ball.radius + signed, self.height(tip), tip)
+        };
+        let reaches: Vec<_> = balls.par_iter().map(of_ball).collect();
+        let most: Vec<f64> = reaches.iter().map(|&(most, ..)| most).collect();
+        let all: Vec<u32> =
+            (0..balls.len() as u32).filter(|&i| most[i as usize] > -ROUNDING).collect();
+        let corners = all.iter().flat_map(|&i| {
+            let Sphere { centre, radius } = balls[i as usize];
+            [centre - radius, centre + radius]
+        });
+        let mut search = Search::over(Bounds::of_points(corners), all.clone(), tolerance);
+        for (_, height, tip) in reaches {
+            search.raise(height, tip);
         }
-        let sides = balls.iter().zip(balls.iter().cycle().skip(1));
-        let edge = sides.map(|(a, b)| a.centre.distance(b.centre)).fold(0.0, f64::max);
-        (radius + least + edge, height, at)
+        search.run(|cube, enough| self.overshoot_in(balls, &most, cube, enough))
+    }
+
+    /// [`Self::uncovered`] and [`Self::overshoot`] of the union of spheres, cones and slabs.
+    ///
+    /// # Errors
+    /// A tolerance out of range or too fine.
+    pub fn of_union(
+        &self,
+        union: &MedialUnion,
+        tolerance: f64,
+    ) -> Result<[OneSided; 2], MetricError> {
+        check_tolerance(tolerance)?;
+        let (lo, hi) = union.bounding_box();
+        let [solid, balls] = [self.bounds, Bounds { lo, hi }].map(|bounds| {
+            let search = Search::over(bounds, vec![0], tolerance);
+            Search { most_for_zero: MOST_FOR_ZERO_OF_MESH, ..search }
+        });
+        Ok([
+            solid.run(|cube, enough| self.uncovered_by(union, cube, enough))?,
+            balls.run(|cube, enough| self.overshoot_of(union, cube, enough))?,
+        ])
+    }
+
+    fn uncovered_by(&self, union: &MedialUnion, cube: &Cube, enough: f64) -> Bound {
+        let (q, reach) = (cube.centre, cube.reach());
+        let sigma = union.signed(q);
+        let upper = sigma + reach;
+        if upper <= enough {
+            return Bound::closed(upper);
+        }
+        let (reached, at) = match self.inside.side(q) {
+            Side::Outside => {
+                let closest = self.tree.closest(q);
+                if closest.distance > reach + ROUNDING {
+                    return Bound::closed(f64::NEG_INFINITY);
+                }
+                (union.signed(closest.point), closest.point)
+            }
+            Side::Inside | Side::On => (sigma, q),
+        };
+        Bound { reached, at, upper, balls: Vec::new() }
+    }
+
+    fn overshoot_of(&self, union: &MedialUnion, cube: &Cube, enough: f64) -> Bound {
+        let (q, reach) = (cube.centre, cube.reach());
+        let upper = self.signed(q, &self.tree.closest(q)) + reach;
+        if upper <= enough {
+            return Bound::closed(upper);
+        }
+        if !union.buries(q, -reach - ROUNDING) {
+            return Bound::closed(f64::NEG_INFINITY);
+        }
+        // A point of the union near the centre of the cube.
+        let at = if union.buries(q, 0.0) { Some(q) } else { union.boundary_near(q, 0.0, &mut 0) };
+        let (reached, at) = at.map_or((f64::NEG_INFINITY, q), |at| (self.height(at), at));
+        Bound { reached, at, upper, balls: Vec::new() }
     }
 
     /// The signed distance of a point, negative in the solid, by its closest surface point.
@@ -260,15 +199,14 @@ impl<'a> CoverTest<'a> {
         }
     }
 
-    fn uncovered_in<B: Body>(&self, bodies: &[B], cube: &Cube, enough: f64) -> Bound {
+    fn uncovered_in(&self, balls: &[Sphere], cube: &Cube, enough: f64) -> Bound {
         let (q, reach) = (cube.centre, cube.reach());
-        let over: Vec<f64> =
-            cube.bodies.iter().map(|&i| bodies[i as usize].signed_distance(q)).collect();
-        let signed = over.iter().copied().fold(f64::INFINITY, f64::min);
+        let over = |i: &u32| balls[*i as usize].signed_distance(q);
+        let signed = cube.balls.iter().map(over).fold(f64::INFINITY, f64::min);
         let mut upper = signed + reach;
-        if upper > enough {
-            let most = |&i: &u32| bodies[i as usize].range(q, cube.half)[1];
-            upper = cube.bodies.iter().map(most).fold(upper, f64::min);
+        for &i in &cube.balls {
+            let Sphere { centre, radius } = balls[i as usize];
+            upper = upper.min(((q - centre).abs() + cube.half).length() - radius);
         }
         if upper <= enough {
             return Bound::closed(upper);
@@ -279,60 +217,63 @@ impl<'a> CoverTest<'a> {
         if side == Side::Outside && !is_near {
             return Bound::closed(f64::NEG_INFINITY);
         }
-        // The closest point of the surface is in the solid, and the list of bodies holds around it.
+        // The closest point of the surface is in the solid, and the list of balls holds around it.
         let (reached, at) = match side {
             Side::Outside => {
-                let at = closest.point;
-                let each = cube.bodies.iter().map(|&i| bodies[i as usize].signed_distance(at));
-                (each.fold(f64::INFINITY, f64::min), at)
+                let least = |least: f64, &i: &u32| {
+                    least.min(balls[i as usize].signed_distance(closest.point))
+                };
+                (cube.balls.iter().fold(f64::INFINITY, least), closest.point)
             }
             Side::Inside | Side::On => (signed, q),
         };
-        // No body that is farther than this from `q` is the nearest one within `reach` of it.
-        let list = cube.bodies.iter().zip(over).filter(|(_, over)| *over <= signed + 2.0 * reach);
-        Bound { reached, at, upper, bodies: list.map(|(&i, _)| i).collect() }
+        // No ball that is farther than this from `q` is the nearest one within `reach` of it.
+        let list = cube.balls.iter().copied().filter(|i| over(i) <= signed + 2.0 * reach);
+        Bound { reached, at, upper, balls: list.collect() }
     }
 
-    fn overshoot_in<B: Body>(&self, bodies: &[B], most: &[f64], cube: &Cube, enough: f64) -> Bound {
+    fn overshoot_in(&self, balls: &[Sphere], most: &[f64], cube: &Cube, enough: f64) -> Bound {
         let (q, reach) = (cube.centre, cube.reach());
         let meets = |&i: &u32| {
-            let i = i as usize;
-            most[i] > enough && bodies[i].range(q, cube.half)[0] <= ROUNDING
+            let Sphere { centre, radius } = balls[i as usize];
+            let apart = ((q - centre).abs() - cube.half).max(Vec3::ZERO).length();
+            most[i as usize] > enough && apart <= radius + ROUNDING
         };
-        let list: Vec<u32> = cube.bodies.iter().copied().filter(meets).collect();
+        let list: Vec<u32> = cube.balls.iter().copied().filter(meets).collect();
         if list.is_empty() {
-            // Each body that was dropped here is no farther away from the solid than `enough`.
-            let upper = cube.bodies.iter().map(|&i| most[i as usize].min(enough));
+            // Each ball that was dropped here is no farther away from the solid than `enough`.
+            let upper = cube.balls.iter().map(|&i| most[i as usize].min(enough));
             return Bound::closed(upper.fold(f64::NEG_INFINITY, f64::max));
         }
         let closest = self.tree.closest(q);
         let signed = self.signed(q, &closest);
-        let of_bodies = list.iter().map(|&i| most[i as usize]).fold(f64::NEG_INFINITY, f64::max);
-        // Dropped bodies count as `enough`.
-        let upper = of_bodies.min(signed + reach).max(enough.min(signed + reach));
+        let of_balls = list.iter().map(|&i| most[i as usize]).fold(f64::NEG_INFINITY, f64::max);
+        // Dropped balls count as `enough`.
+        let upper = of_balls.min(signed + reach).max(enough.min(signed + reach));
         if upper <= enough {
             return Bound::closed(upper);
         }
         // A point of the union near the centre of the cube.
-        let over = |&i: &u32| (bodies[i as usize].signed_distance(q), i);
-        let deepest = list.iter().map(over).min_by(|a, b| a.0.total_cmp(&b.0));
-        let (reached, at) = match deepest.filter(|&(over, _)| over > 0.0) {
+        let depth = |i: &&u32| balls[**i as usize].signed_distance(q);
+        let deepest = list.iter().min_by(|i, j| depth(i).total_cmp(&depth(j)));
+        let outside = deepest.map(|&i| balls[i as usize]).filter(|b| b.signed_distance(q) > 0.0);
+        let (reached, at) = match outside {
             None => (signed, q),
-            Some((_, i)) => {
-                let at = bodies[i as usize].foot(q);
+            Some(Sphere { centre, radius }) => {
+                let at = centre + radius * (q - centre).normalize_or(Vec3::X);
                 (self.height(at), at)
             }
         };
-        Bound { reached, at, upper, bodies: list }
+        Bound { reached, at, upper, balls: list }
     }
 }
 
 /// # Errors
 /// When there are no balls, one is not finite, or the tolerance is out of range.
-fn check_balls(balls: &[Sphere], tolerance: f64) -> Result<(), MetricError> {
+fn check(balls: &[Sphere], tolerance: f64) -> Result<(), MetricError> {
     check_tolerance(tolerance)?;
-    MedialUnion::of_spheres(balls)?;
-    Ok(())
+    // The checks of a union: there are balls, and all are finite.
+    MedialUnion::of_spheres(balls).map(drop).map_err(|error: UnionError| error.into())
 }
 
 /// # Errors
@@ -344,12 +285,12 @@ fn check_tolerance(tolerance: f64) -> Result<(), MetricError> {
     Ok(())
 }
 
-/// A cube, and the bodies that can matter in it.
+/// A cube, and the balls that can matter in it.
 struct Cube {
     centre: Vec3,
     /// Half of its side.
     half: f64,
-    bodies: Vec<u32>,
+    balls: Vec<u32>,
 }
 
 impl Cube {
@@ -365,14 +306,14 @@ struct Bound {
     reached: f64,
     at: Vec3,
     upper: f64,
-    /// The bodies that matter in its eighths.
-    bodies: Vec<u32>,
+    /// The balls that matter in its eighths.
+    balls: Vec<u32>,
 }
 
 impl Bound {
     /// Of a cube that is not divided.
     fn closed(upper: f64) -> Self {
-        Self { reached: f64::NEG_INFINITY, at: Vec3::ZERO, upper, bodies: Vec::new() }
+        Self { reached: f64::NEG_INFINITY, at: Vec3::ZERO, upper, balls: Vec::new() }
     }
 }
 
@@ -382,17 +323,19 @@ struct Search {
     lower: f64,
     witness: Option<Vec3>,
     tolerance: f64,
+    /// Cubes of a round up to which a proof of zero goes on.
+    most_for_zero: usize,
 }
 
 impl Search {
-    fn over(bounds: Bounds, bodies: Vec<u32>, tolerance: f64) -> Self {
+    fn over(bounds: Bounds, balls: Vec<u32>, tolerance: f64) -> Self {
         let mut cubes = Vec::new();
-        if !bodies.is_empty() {
+        if !balls.is_empty() {
             let half = 0.5 * (bounds.hi - bounds.lo).max_element();
             let centre = 0.5 * (bounds.lo + bounds.hi);
-            cubes.push(Cube { centre, half: half * (1.0 + 1e-9), bodies });
+            cubes.push(Cube { centre, half: half * (1.0 + 1e-9), balls });
         }
-        Self { cubes, lower: 0.0, witness: None, tolerance }
+        Self { cubes, lower: 0.0, witness: None, tolerance, most_for_zero: MOST_FOR_ZERO }
     }
 
     /// Takes a distance that is reached at a point.
@@ -410,7 +353,8 @@ impl Search {
         // Once given up, a proof of zero is not resumed: `upper` is positive by then.
         let mut proves = true;
         while let Some(first) = cubes.first() {
-            proves &= self.lower == 0.0 && cubes.len() <= MOST_FOR_ZERO && first.reach() > SMALLEST;
+            proves &=
+                self.lower == 0.0 && cubes.len() <= self.most_for_zero && first.reach() > SMALLEST;
             let now = if proves { -ROUNDING } else { self.lower + goal };
             let bounds: Vec<Bound> =
                 cubes.par_iter().with_min_len(16).map(|cube| bound(cube, now)).collect();
@@ -429,7 +373,7 @@ impl Search {
                 for octant in 0..8_u32 {
                     let sign = |bit: u32| if octant >> bit & 1 == 1 { half } else { -half };
                     let centre = cube.centre + Vec3::new(sign(0), sign(1), sign(2));
-                    eighths.push(Cube { centre, half, bodies: bound.bodies.clone() });
+                    eighths.push(Cube { centre, half, balls: bound.balls.clone() });
                 }
                 if eighths.len() > MOST {
                     return Err(MetricError::TooFine { tolerance: self.tolerance, pieces: MOST });
@@ -448,6 +392,7 @@ mod tests {
     use rand_pcg::Pcg64;
 
     use super::*;
+    use crate::complex::MedialMesh;
     use crate::surface::TriMesh;
 
     const TOLERANCE: f64 = 1e-3;
@@ -588,7 +533,7 @@ mod tests {
             let (edges, faces) = (vec![[0, 1], [5, 6]], vec![[1, 2, 3], [2, 3, 4], [6, 7, 5]]);
             let medial = MedialMesh::from_simplices(spheres, edges, faces).unwrap();
             let union = MedialUnion::new(&medial).unwrap();
-            let intervals = test.of_mesh(&medial, TOLERANCE).unwrap();
+            let intervals = test.of_union(&union, TOLERANCE).unwrap();
             let mut largest = [0.0_f64; 2];
             for _ in 0..20_000 {
                 let p = point(Vec3::new(0.5, 0.3, 0.15));
@@ -625,7 +570,8 @@ mod tests {
         let test = CoverTest::new(&mesh.vertices, &tree, &inside);
         let ends = [-0.05, 0.05].map(|x| Sphere::new(Vec3::new(x, 0.0, 0.0), 0.08));
         let rod = MedialMesh::from_simplices(ends.to_vec(), vec![[0, 1]], vec![]).unwrap();
-        let [uncovered, overshoot] = test.of_mesh(&rod, TOLERANCE).unwrap();
+        let [uncovered, overshoot] =
+            test.of_union(&MedialUnion::new(&rod).unwrap(), TOLERANCE).unwrap();
         assert_eq!(uncovered.upper, 0.0);
         holds(overshoot, 0.08);
         assert!(test.uncovered(&ends, TOLERANCE).unwrap().lower > 0.0);

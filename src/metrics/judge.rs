@@ -133,10 +133,9 @@ impl Judge {
         );
         let ((distances, envelope), axis) = (distances?, axis.transpose()?);
         let mut warnings = self.misfits(mesh, union, &distances);
-        // A list of spheres has no connectivity that could be wrong.
-        if mesh.spheres.len() == 1 || !mesh.edges.is_empty() {
-            warnings.extend(topology_warning(betti, self.truth.betti));
-        }
+        // A list of spheres has no connectivity that could be wrong, and no structure.
+        let is_connected = mesh.spheres.len() == 1 || !mesh.edges.is_empty();
+        warnings.extend(topology_warning(betti, self.truth.betti).filter(|_| is_connected));
         let volumes = match volumes {
             // The surface was accepted as a solid, and all other measures are defined.
             Err(MetricError::NoVolume(volume)) => {
@@ -164,7 +163,7 @@ impl Judge {
             expected_betti: self.truth.betti,
             counts: counts(mesh),
             axis,
-            structure: Some(structure?),
+            structure: Some(structure?).filter(|_| is_connected),
             diagonal: self.truth.diagonal,
             seed: self.options.seed,
         })
@@ -214,18 +213,14 @@ impl Judge {
         mesh: &MedialMesh,
         certify: Option<f64>,
     ) -> Result<Evaluation, MetricError> {
-        let mut evaluation = self.evaluate(mesh)?;
-        match certify {
-            Some(tolerance) => {
-                evaluation.certified = Some(self.certify(mesh, tolerance)?);
-                evaluation.cover = Some(self.cover(mesh, tolerance)?);
-            }
-            // The other measures hold without them, as of spheres in other units.
-            None if mesh.edges.is_empty() => match self.cover(mesh, COVER_TOLERANCE) {
+        let certified = certify.map(|tolerance| self.certify(mesh, tolerance)).transpose()?;
+        let mut evaluation = Evaluation { certified, ..self.evaluate(mesh)? };
+        if let Some(tolerance) = certify.or(mesh.edges.is_empty().then_some(COVER_TOLERANCE)) {
+            match self.cover(mesh, tolerance) {
                 Ok(cover) => evaluation.cover = Some(cover),
+                // The other measures hold without them, as of spheres in other units.
                 Err(error) => evaluation.warnings.push(format!("no one-sided errors: {error}")),
-            },
-            None => {}
+            }
         }
         Ok(evaluation)
     }
@@ -244,7 +239,7 @@ impl Judge {
                 test.uncovered(&mesh.spheres, tolerance)?,
                 test.overshoot(&mesh.spheres, tolerance)?,
             ],
-            false => test.of_mesh(&mesh, tolerance)?,
+            false => test.of_union(&union, tolerance)?,
         };
         let uncovered_at = union.signed_batch(&samples.points[..samples.uniform]);
         let options = EnvelopeOptions {
@@ -331,10 +326,14 @@ impl Judge {
                 mesh.spheres.len()
             ));
         }
-        if let Some([low, median, high]) = self.radius_quartiles(mesh)
+        if let Some([[low, median, high], beyond]) = self.radius_quartiles(mesh)
             && distances.mean > LARGE_MEAN
         {
-            let off = !(2.0 / 3.0..=1.5).contains(&median);
+            // Equal radii, and those that exceed the distances by the same, enclose a solid on purpose.
+            let radius = mesh.spheres[0].radius;
+            let is_chosen = mesh.spheres[1..].iter().all(|s| s.radius == radius)
+                || beyond[0] > 0.0 && beyond[2] < 1.1 * beyond[0];
+            let off = !(2.0 / 3.0..=1.5).contains(&median) && !is_chosen;
             // The same factor for all radii is not the work of a simplification.
             let scaled = (median - 1.0).abs() > 0.1 && high < 1.1 * low;
             if off || scaled {
@@ -352,18 +351,20 @@ impl Judge {
         misfits
     }
 
-    /// Quartiles of the ratio of radius to distance of the centre from the surface; `None` if all
-    /// centres lie on the surface.
-    fn radius_quartiles(&self, mesh: &MedialMesh) -> Option<[f64; 3]> {
+    /// Quartiles of the ratio of radius to distance of the centre from the surface, and of their difference;
+    /// `None` if all centres lie on the surface.
+    fn radius_quartiles(&self, mesh: &MedialMesh) -> Option<[[f64; 3]; 2]> {
         let centres: Vec<_> = mesh.spheres.iter().map(|s| s.centre).collect();
         let depths = self.tree.distance_batch(&centres);
         let off_surface = mesh.spheres.iter().zip(depths).filter(|&(_, depth)| depth > ON_SURFACE);
-        let mut ratios: Vec<f64> = off_surface.map(|(s, depth)| s.radius / depth).collect();
-        ratios.sort_unstable_by(f64::total_cmp);
-        if ratios.is_empty() {
-            return None;
-        }
-        Some([0.25, 0.5, 0.75].map(|share| ratios[(share * ratios.len() as f64) as usize]))
+        let pairs = off_surface.map(|(s, depth)| (s.radius / depth, s.radius - depth));
+        let (ratios, beyond): (Vec<f64>, Vec<f64>) = pairs.unzip();
+        (!ratios.is_empty()).then(|| {
+            [ratios, beyond].map(|mut values| {
+                values.sort_unstable_by(f64::total_cmp);
+                [0.25, 0.5, 0.75].map(|share| values[(share * values.len() as f64) as usize])
+            })
+        })
     }
 }
 
@@ -422,6 +423,13 @@ pub struct Evaluation {
 }
 
 impl Evaluation {
+    /// Whether the Betti numbers are the solid's; `None` if these are unknown, or of spheres without edges, which have no
+    /// connectivity.
+    pub fn has_right_topology(&self) -> Option<bool> {
+        let is_connected = self.counts.spheres == 1 || self.counts.edges > 0;
+        self.expected_betti.filter(|_| is_connected).map(|expected| self.betti == expected)
+    }
+
     /// Maps the witnesses of all intervals, as to the units of the input.
     pub fn move_witnesses(&mut self, map: impl Fn(Vec3) -> Vec3) {
         if let Some(certified) = &mut self.certified {

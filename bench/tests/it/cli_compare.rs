@@ -90,6 +90,36 @@ fn native_levels_bounds_chains_and_the_start_are_rows() {
     }
 }
 
+#[test]
+fn spheres_alone_have_a_table_of_cover() {
+    let at = folder();
+    let out = at("report");
+    let line = "compare builtin:capsule --methods cover:mood=outside,cover:mood=inside,qmat --spheres 12 \
+                --counts-only --samples 500 -q --out";
+    let table = |more: &[&str]| {
+        done(&[&words(line)[..], &[&out], more].concat());
+        fs::read_to_string(at("report/tables/overview-cover.md")).expect("a table")
+    };
+    let rows = |table: &str| table.lines().filter(|line| line.starts_with("| 12 |")).count();
+    // Q-MAT's results have edges.
+    assert_eq!(rows(&table(&[])), 2);
+    let alone = table(&["--spheres-alone"]);
+    assert_eq!(rows(&alone), 3, "{alone}");
+    for record in records(&out).iter().filter(|r| r["evaluate"]["counts"]["edges"] == 0) {
+        let [uncovered, overshoot] =
+            ["uncovered", "overshoot"].map(|side| &record["evaluate"]["cover"][side]["upper"]);
+        match record["simplify"]["params"]["mood"].as_str() {
+            Some("outside") => assert_eq!(uncovered, 0.0, "{record}"),
+            Some("inside") => assert_eq!(overshoot, 0.0, "{record}"),
+            _ => assert!(uncovered.as_f64() > Some(0.0), "{record}"),
+        }
+        assert!(record["evaluate"]["structure"].is_null(), "{record}");
+    }
+    assert!(fs::exists(at("report/plots/mesh-capsule-cover.svg")).expect("a folder"));
+    let page = fs::read_to_string(at("report/index.html")).expect("a page");
+    assert!(page.contains("Cover: one-sided errors"), "no table on the page");
+}
+
 /// The table of the summary without its numbers.
 fn heads(stdout: &str) -> String {
     let lines = stdout.lines().take_while(|text| !text.contains("in % of the diagonal"));
