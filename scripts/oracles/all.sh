@@ -1,6 +1,6 @@
 #!/bin/sh
-# Every metric against an independent second opinion, in one table: sets up what it needs (Open3D and GUDHI
-# from PyPI in a virtual environment below the build folder; CGAL from Debian: libcgal-dev, libgmp-dev,
+# Every metric against an independent second opinion, in one table: sets up what it needs (Open3D, trimesh
+# and GUDHI from PyPI in a virtual environment below the build folder; CGAL from Debian: libcgal-dev, libgmp-dev,
 # libmpfr-dev, g++, and tetgen), runs all comparisons, and writes the table to oracles.json (and, with DIR,
 # into that report) and oracles.md in the build folder's `oracles`. Missing programs count as skipped.
 # Exit codes: 0 all that ran agree, 1 some differ.
@@ -36,12 +36,12 @@ say() { # metric oracle input result agrees
 }
 
 python=${ORACLE_PYTHON:-$work/python/bin/python}
-if ! "$python" -c 'import open3d, gudhi' 2>/dev/null; then
+if ! "$python" -c 'import open3d, gudhi, trimesh' 2>/dev/null; then
     python3 -m venv "$work/python" &&
-        "$work/python/bin/pip" install --quiet open3d gudhi >"$work/pip.log" 2>&1 || true
+        "$work/python/bin/pip" install --quiet open3d gudhi trimesh >"$work/pip.log" 2>&1 || true
 fi
 has_python=yes
-"$python" -c 'import open3d, gudhi' 2>"$work/python.log" || has_python=
+"$python" -c 'import open3d, gudhi, trimesh' 2>"$work/python.log" || has_python=
 has_cgal=yes
 [ -e /usr/include/CGAL/Polygon_mesh_processing/distance.h ] || has_cgal=
 
@@ -121,7 +121,12 @@ for name in $names; do
     done
 done
 
-# 3. The triangulation that the initial medial mesh is made of.
+# 3. One-sided errors of spheres, by a million points each.
+# shellcheck disable=SC2086 # a list of files without spaces
+"$python" scripts/oracles/cover.py "$medial" "$work" $names >"$work/cover.txt" || true
+tail -n 1 "$work/cover.txt" | tee -a "$rows"
+
+# 4. The triangulation that the initial medial mesh is made of.
 for name in $names; do
     label=$(basename "$name")
     if [ ! $has_python ] || ! command -v tetgen >/dev/null; then
@@ -133,7 +138,7 @@ for name in $names; do
     fi
 done
 
-# 4. What the test suite compares by brute force or closed form.
+# 5. What the test suite compares by brute force or closed form.
 while IFS='|' read -r metric oracle input; do
     say "$metric" "$oracle" "$input" "cargo test" "in the test suite"
 done <<'END'
