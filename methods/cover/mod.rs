@@ -191,6 +191,17 @@ impl PreparedCover<'_> {
         CoverTest::new(&self.shape.mesh().vertices, &self.tree, &self.inside)
     }
 
+    /// The certified interval of `G`, no wider than `width`, or than the least multiple that can be certified: where the
+    /// same gap is on whole curves, as on a torus, a narrow one has too many cubes.
+    fn gap(&self, balls: &[Sphere], mut width: f64) -> Result<OneSided> {
+        loop {
+            match self.test().uncovered(balls, width) {
+                Err(MetricError::TooFine { .. }) if width < 0.25 => width *= 4.0,
+                other => return other.map_err(failed),
+            }
+        }
+    }
+
     /// Steps 1 to 5: inner balls, and the interval of their `G`.
     fn placed(
         &self,
@@ -241,7 +252,7 @@ impl PreparedCover<'_> {
             swaps += placement.swap(&candidates, (swap_power, count), run)?;
             placement.focus(&pool);
             let width = (ROUGH * placement.worst().0).max(LEAST_WIDTH);
-            let gap = self.test().uncovered(&placement.balls, width).map_err(failed)?;
+            let gap = self.gap(&placement.balls, width)?;
             // A swap can raise the largest gap while it lowers the sum.
             if best.as_ref().is_none_or(|&(_, least)| gap.lower < least) {
                 best = Some((placement.balls.clone(), gap.lower));
@@ -255,9 +266,8 @@ impl PreparedCover<'_> {
             let least = depths.fold(f64::INFINITY, f64::min);
             balls.iter_mut().for_each(|ball| ball.radius = least);
         }
-        let rough = self.test().uncovered(&balls, ROUGH_FIRST).map_err(failed)?;
-        let width = (WIDTH * rough.upper).max(LEAST_WIDTH);
-        let gap = self.test().uncovered(&balls, width).map_err(failed)?;
+        let rough = self.gap(&balls, ROUGH_FIRST)?;
+        let gap = self.gap(&balls, (WIDTH * rough.upper).max(LEAST_WIDTH))?;
         Ok((balls, gap))
     }
 
@@ -287,7 +297,7 @@ impl PreparedCover<'_> {
         let mut margin = (BEYOND_SHARE * gap.upper).max(BEYOND);
         loop {
             let balls = grown(inner, gap.upper + margin);
-            let uncovered = self.test().uncovered(&balls, PROOF_WIDTH).map_err(failed)?;
+            let uncovered = self.gap(&balls, PROOF_WIDTH)?;
             // With a margin of the solid's size there is nothing to prove.
             if uncovered.upper == 0.0 || margin > 1.0 {
                 return Ok(gap.upper + margin);

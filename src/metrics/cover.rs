@@ -154,17 +154,19 @@ impl<'a> CoverTest<'a> {
         if upper <= enough {
             return Bound::closed(upper);
         }
-        let (reached, at) = match self.inside.side(q) {
-            Side::Outside => {
-                let closest = self.tree.closest(q);
-                if closest.distance > reach + ROUNDING {
-                    return Bound::closed(f64::NEG_INFINITY);
-                }
-                (union.signed(closest.point), closest.point)
+        let (mut place, mut reached, mut at) = (cube.place, sigma, q);
+        if let Place::Near(face) = place {
+            let closest = self.tree.closest_from(q, face);
+            if closest.distance <= reach + ROUNDING {
+                place = Place::Near(Some(closest.face));
+                (reached, at) = (union.signed(closest.point), closest.point);
+            } else if self.inside.side(q) == Side::Outside {
+                return Bound::closed(f64::NEG_INFINITY);
+            } else {
+                place = Place::Inside;
             }
-            Side::Inside | Side::On => (sigma, q),
-        };
-        Bound { reached, at, upper, balls: Vec::new() }
+        }
+        Bound { reached, at, upper, place, balls: Vec::new() }
     }
 
     fn overshoot_of(&self, union: &MedialUnion, cube: &Cube, enough: f64) -> Bound {
@@ -179,7 +181,7 @@ impl<'a> CoverTest<'a> {
         // A point of the union near the centre of the cube.
         let at = if union.buries(q, 0.0) { Some(q) } else { union.boundary_near(q, 0.0, &mut 0) };
         let (reached, at) = at.map_or((f64::NEG_INFINITY, q), |at| (self.height(at), at));
-        Bound { reached, at, upper, balls: Vec::new() }
+        Bound { reached, at, upper, place: cube.place, balls: Vec::new() }
     }
 
     /// The signed distance of a point, negative in the solid, by its closest surface point.
@@ -211,25 +213,26 @@ impl<'a> CoverTest<'a> {
         if upper <= enough {
             return Bound::closed(upper);
         }
-        let closest = self.tree.closest(q);
-        let is_near = closest.distance <= reach + ROUNDING;
-        let side = self.inside.side(q);
-        if side == Side::Outside && !is_near {
-            return Bound::closed(f64::NEG_INFINITY);
-        }
-        // The closest point of the surface is in the solid, and the list of balls holds around it.
-        let (reached, at) = match side {
-            Side::Outside => {
+        let (mut place, mut reached, mut at) = (cube.place, signed, q);
+        if let Place::Near(face) = place {
+            let closest = self.tree.closest_from(q, face);
+            if closest.distance <= reach + ROUNDING {
+                place = Place::Near(Some(closest.face));
+                // The closest point of the surface is in the solid, and the list of balls holds around it.
                 let least = |least: f64, &i: &u32| {
                     least.min(balls[i as usize].signed_distance(closest.point))
                 };
-                (cube.balls.iter().fold(f64::INFINITY, least), closest.point)
+                at = closest.point;
+                reached = cube.balls.iter().fold(f64::INFINITY, least);
+            } else if self.inside.side(q) == Side::Outside {
+                return Bound::closed(f64::NEG_INFINITY);
+            } else {
+                place = Place::Inside;
             }
-            Side::Inside | Side::On => (signed, q),
-        };
+        }
         // No ball that is farther than this from `q` is the nearest one within `reach` of it.
         let list = cube.balls.iter().copied().filter(|i| over(i) <= signed + 2.0 * reach);
-        Bound { reached, at, upper, balls: list.collect() }
+        Bound { reached, at, upper, place, balls: list.collect() }
     }
 
     fn overshoot_in(&self, balls: &[Sphere], most: &[f64], cube: &Cube, enough: f64) -> Bound {
@@ -264,7 +267,7 @@ impl<'a> CoverTest<'a> {
                 (self.height(at), at)
             }
         };
-        Bound { reached, at, upper, balls: list }
+        Bound { reached, at, upper, place: cube.place, balls: list }
     }
 }
 
@@ -290,7 +293,17 @@ struct Cube {
     centre: Vec3,
     /// Half of its side.
     half: f64,
+    place: Place,
     balls: Vec<u32>,
+}
+
+/// What a cube inherits about the surface.
+#[derive(Clone, Copy)]
+enum Place {
+    /// It can meet the surface, of which this face is near.
+    Near(Option<u32>),
+    /// It is within the solid.
+    Inside,
 }
 
 impl Cube {
@@ -306,6 +319,7 @@ struct Bound {
     reached: f64,
     at: Vec3,
     upper: f64,
+    place: Place,
     /// The balls that matter in its eighths.
     balls: Vec<u32>,
 }
@@ -313,7 +327,13 @@ struct Bound {
 impl Bound {
     /// Of a cube that is not divided.
     fn closed(upper: f64) -> Self {
-        Self { reached: f64::NEG_INFINITY, at: Vec3::ZERO, upper, balls: Vec::new() }
+        Self {
+            reached: f64::NEG_INFINITY,
+            at: Vec3::ZERO,
+            upper,
+            place: Place::Near(None),
+            balls: Vec::new(),
+        }
     }
 }
 
@@ -333,7 +353,7 @@ impl Search {
         if !balls.is_empty() {
             let half = 0.5 * (bounds.hi - bounds.lo).max_element();
             let centre = 0.5 * (bounds.lo + bounds.hi);
-            cubes.push(Cube { centre, half: half * (1.0 + 1e-9), balls });
+            cubes.push(Cube { centre, half: half * (1.0 + 1e-9), place: Place::Near(None), balls });
         }
         Self { cubes, lower: 0.0, witness: None, tolerance, most_for_zero: MOST_FOR_ZERO }
     }
@@ -373,7 +393,8 @@ impl Search {
                 for octant in 0..8_u32 {
                     let sign = |bit: u32| if octant >> bit & 1 == 1 { half } else { -half };
                     let centre = cube.centre + Vec3::new(sign(0), sign(1), sign(2));
-                    eighths.push(Cube { centre, half, balls: bound.balls.clone() });
+                    let (place, balls) = (bound.place, bound.balls.clone());
+                    eighths.push(Cube { centre, half, place, balls });
                 }
                 if eighths.len() > MOST {
                     return Err(MetricError::TooFine { tolerance: self.tolerance, pieces: MOST });
