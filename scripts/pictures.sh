@@ -26,4 +26,4 @@ for mood in outside inside balanced; do
     "$medial" simplify builtin:bracket --method cover --spheres 32 --set mood=$mood -o "$work/$mood.yaml"
 done
 "$medial" render builtin:bracket "$work/outside.yaml" "$work/inside.yaml" "$work/balanced.yaml" \
-    --show error --max-error 0.05 --size 270x210 -o "$folder/spheres.png"
+    --show error --max-error 0.05 --size 262x200 -o "$folder/spheres.png"
