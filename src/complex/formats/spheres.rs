@@ -28,72 +28,54 @@ use super::{LoadedMa, MaError, MaErrorKind, ReadOptions, extension};
 use crate::Vec3;
 use crate::complex::{MedialMesh, Sphere};
 
-/// The text of a format: before all spheres, of each, between two, and behind all.
-struct Layout {
-    extensions: &'static [&'static str],
-    head: &'static str,
-    sphere: &'static str,
-    between: &'static str,
-    tail: &'static str,
-}
+/// The text of a format: its extensions, and the text before all spheres, of each, between two, and behind all.
+struct Layout(&'static [&'static str], &'static str, &'static str, &'static str, &'static str);
 
-/// Names in `{link}` are quoted strings of JSON, which YAML and, without `"` and `&`, XML share.
+/// `{link}` is a quoted string.
 const LAYOUTS: [Layout; 7] = [
-    Layout {
-        extensions: &["csv"],
-        head: "x,y,z,r\n",
-        sphere: "{x},{y},{z},{r}\n",
-        between: "",
-        tail: "",
-    },
-    Layout {
-        extensions: &["txt", "xyzr"],
-        head: "",
-        sphere: "{x} {y} {z} {r}\n",
-        between: "",
-        tail: "",
-    },
-    Layout {
-        extensions: &["json"],
-        head: "{\"spheres\": [\n",
-        sphere: "  {\"center\": [{x}, {y}, {z}], \"radius\": {r}}",
-        between: ",\n",
-        tail: "\n]}\n",
-    },
-    Layout {
-        extensions: &["yaml", "yml"],
-        head: "collision_spheres:\n  {link}:\n",
-        sphere: "    - center: [{x}, {y}, {z}]\n      radius: {r}\n",
-        between: "",
-        tail: "",
-    },
-    Layout {
-        extensions: &["xrdf"],
-        head: "format: xrdf\nformat_version: 1.0\ncollision:\n  geometry: {link}\ngeometry:\n  {link}:\n    spheres:\n      \
-               {link}:\n",
-        sphere: "        - center: [{x}, {y}, {z}]\n          radius: {r}\n",
-        between: "",
-        tail: "",
-    },
-    Layout {
-        extensions: &["urdf"],
-        head: "<?xml version=\"1.0\"?>\n<robot name={link}>\n  <link name={link}>\n",
-        sphere: "    <collision><origin xyz=\"{x} {y} {z}\" rpy=\"0 0 0\"/><geometry><sphere radius=\"{r}\"/></geometry>\
-                 </collision>\n",
-        between: "",
-        tail: "  </link>\n</robot>\n",
-    },
-    Layout {
-        extensions: &["xml"],
-        head: "<mujoco model={link}>\n  <worldbody>\n    <body name={link}>\n",
-        sphere: "      <geom type=\"sphere\" pos=\"{x} {y} {z}\" size=\"{r}\"/>\n",
-        between: "",
-        tail: "    </body>\n  </worldbody>\n</mujoco>\n",
-    },
+    Layout(&["csv"], "x,y,z,r\n", "{x},{y},{z},{r}\n", "", ""),
+    Layout(&["txt", "xyzr"], "", "{x} {y} {z} {r}\n", "", ""),
+    Layout(
+        &["json"],
+        "{\"spheres\": [\n",
+        "  {\"center\": [{x}, {y}, {z}], \"radius\": {r}}",
+        ",\n",
+        "\n]}\n",
+    ),
+    Layout(
+        &["yaml", "yml"],
+        "collision_spheres:\n  {link}:\n",
+        "    - center: [{x}, {y}, {z}]\n      radius: {r}\n",
+        "",
+        "",
+    ),
+    Layout(
+        &["xrdf"],
+        "format: xrdf\nformat_version: 1.0\ncollision:\n  geometry: {link}\ngeometry:\n  {link}:\n    spheres:\n      \
+         {link}:\n",
+        "        - center: [{x}, {y}, {z}]\n          radius: {r}\n",
+        "",
+        "",
+    ),
+    Layout(
+        &["urdf"],
+        "<?xml version=\"1.0\"?>\n<robot name={link}>\n  <link name={link}>\n",
+        "    <collision><origin xyz=\"{x} {y} {z}\" rpy=\"0 0 0\"/><geometry><sphere radius=\"{r}\"/></geometry>\
+         </collision>\n",
+        "",
+        "  </link>\n</robot>\n",
+    ),
+    Layout(
+        &["xml"],
+        "<mujoco model={link}>\n  <worldbody>\n    <body name={link}>\n",
+        "      <geom type=\"sphere\" pos=\"{x} {y} {z}\" size=\"{r}\"/>\n",
+        "",
+        "    </body>\n  </worldbody>\n</mujoco>\n",
+    ),
 ];
 
 fn layout(extension: &str) -> Option<&'static Layout> {
-    LAYOUTS.iter().find(|layout| layout.extensions.contains(&extension))
+    LAYOUTS.iter().find(|layout| layout.0.contains(&extension))
 }
 
 /// The elements of a medial mesh that a file of this name cannot hold, as a note; `None` if it holds all.
@@ -118,25 +100,25 @@ pub fn left_out(path: impl AsRef<Path>, mesh: &MedialMesh) -> Option<String> {
 /// Writes the spheres of a mesh into the file `path`, whose extension is one of [`LAYOUTS`].
 pub(super) fn write_spheres(out: &mut dyn Write, path: &Path, mesh: &MedialMesh) -> io::Result<()> {
     let extension = extension(path);
-    let layout = layout(&extension).expect("a format of spheres");
+    let Layout(_, head, row, between, tail) = layout(&extension).expect("a format of spheres");
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let mut link = Value::from(stem.replace(char::is_control, "_")).to_string();
-    if ["urdf", "xml"].contains(&&*extension) {
-        let text = stem.replace(char::is_control, "_");
-        let escaped = text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;");
-        link = format!("\"{escaped}\"");
-    }
-    write!(out, "{}", layout.head.replace("{link}", &link))?;
-    for (k, Sphere { centre, radius }) in mesh.spheres.iter().enumerate() {
-        let mut text = layout.sphere.to_owned();
-        for (field, value) in
-            ["{x}", "{y}", "{z}", "{r}"].into_iter().zip([centre.x, centre.y, centre.z, *radius])
-        {
-            text = text.replace(field, &decimal(value));
+    let link = stem.replace(char::is_control, "_");
+    let link = match &*extension {
+        "urdf" | "xml" => {
+            let escaped = link.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;");
+            format!("\"{escaped}\"")
         }
-        write!(out, "{}{text}", if k > 0 { layout.between } else { "" })?;
+        _ => Value::from(link).to_string(),
+    };
+    write!(out, "{}", head.replace("{link}", &link))?;
+    for (k, Sphere { centre, radius }) in mesh.spheres.iter().enumerate() {
+        let numbers = [("{x}", centre.x), ("{y}", centre.y), ("{z}", centre.z), ("{r}", *radius)];
+        let text = numbers.iter().fold((*row).to_owned(), |text, (field, number)| {
+            text.replace(field, &decimal(*number))
+        });
+        write!(out, "{}{text}", if k > 0 { between } else { "" })?;
     }
-    write!(out, "{}", layout.tail)
+    write!(out, "{tail}")
 }
 
 /// The shortest decimal that is read back as this number, with a point and without an exponent: `1e-5` is a text to
@@ -144,6 +126,12 @@ pub(super) fn write_spheres(out: &mut dyn Write, path: &Path, mesh: &MedialMesh)
 fn decimal(number: f64) -> String {
     let text = number.to_string();
     if text.contains('.') { text } else { text + ".0" }
+}
+
+type Loaded = Result<LoadedMa, MaError>;
+
+fn malformed(name: &str, line: Option<usize>, why: String) -> MaError {
+    MaError { line, ..MaError::of(name, MaErrorKind::Malformed(why)) }
 }
 
 /// The spheres of one link.
@@ -156,16 +144,16 @@ struct Link {
 }
 
 /// The spheres of the requested link as a medial mesh; `name` is the file in errors.
-fn chosen(mut links: Vec<Link>, name: &str, options: ReadOptions) -> Result<LoadedMa, MaError> {
-    let malformed = |why| Err(MaError::of(name, MaErrorKind::Malformed(why)));
+fn chosen(mut links: Vec<Link>, name: &str, options: ReadOptions) -> Loaded {
+    let refused = |why| Err(malformed(name, None, why));
     let others: usize = links.iter().map(|link| link.others).sum();
     links.retain(|link| !link.spheres.is_empty());
     let count = links.len();
     let index = match (options.block, count) {
         (_, 0) if others > 0 => {
-            return malformed(format!("no spheres (found {others} other shapes)"));
+            return refused(format!("no spheres (found {others} other shapes)"));
         }
-        (_, 0) => return malformed("no spheres".to_owned()),
+        (_, 0) => return refused("no spheres".to_owned()),
         (None, 1) => 0,
         (None, _) => {
             let listed = links.iter().enumerate().take(MOST_LISTED);
@@ -173,12 +161,12 @@ fn chosen(mut links: Vec<Link>, name: &str, options: ReadOptions) -> Result<Load
                 listed.map(|(k, link)| format!("{} {}", k + 1, shortened(&link.name))).collect();
             let more = if count > MOST_LISTED { ", ..." } else { "" };
             let listed = listed.join(", ");
-            return malformed(format!("{count} links ({listed}{more}); select one by --block K"));
+            return refused(format!("{count} links ({listed}{more}); select one by --block K"));
         }
         (Some(k), _) if (1..=count).contains(&k) => k - 1,
         (Some(k), _) => {
             let why = format!("there is no block {k}: the file holds {count}, counted from 1");
-            return malformed(why);
+            return refused(why);
         }
     };
     let Link { mut spheres, others, .. } = links.swap_remove(index);
@@ -189,7 +177,7 @@ fn chosen(mut links: Vec<Link>, name: &str, options: ReadOptions) -> Result<Load
     spheres.retain(|sphere| sphere.radius >= 0.0);
     note(&mut notes, all - spheres.len(), "sphere", "dropped: negative radius");
     if spheres.is_empty() {
-        return malformed(format!("no spheres (found {all} with a negative radius)"));
+        return refused(format!("no spheres (found {all} with a negative radius)"));
     }
     canonical(spheres, vec![], vec![], options.radii, notes).map_err(|kind| MaError::of(name, kind))
 }
@@ -198,11 +186,7 @@ fn chosen(mut links: Vec<Link>, name: &str, options: ReadOptions) -> Result<Load
 const MOST_LISTED: usize = 60;
 
 /// Reads rows `x,y,z,r` or `x y z r`, below a header or without one.
-pub(super) fn parse_rows(
-    bytes: &[u8],
-    name: &str,
-    options: ReadOptions,
-) -> Result<LoadedMa, MaError> {
+pub(super) fn parse_rows(bytes: &[u8], name: &str, options: ReadOptions) -> Loaded {
     let mut columns = [0, 1, 2, 3];
     let mut link = Link::default();
     for (k, line) in lines(bytes, name).enumerate() {
@@ -251,11 +235,7 @@ fn fields(text: &str) -> Vec<&str> {
 }
 
 /// Reads rows of four numbers, or the lists of [`parse_ma`], which share their extensions.
-pub(super) fn parse_clump(
-    bytes: &[u8],
-    name: &str,
-    options: ReadOptions,
-) -> Result<LoadedMa, MaError> {
+pub(super) fn parse_clump(bytes: &[u8], name: &str, options: ReadOptions) -> Loaded {
     // The first line of the others can be four counts; the second of none is four numbers then.
     let is_row = |text: &str| {
         let fields = fields(text);
@@ -268,24 +248,15 @@ pub(super) fn parse_clump(
 }
 
 /// Reads every list of spheres in a JSON document: an object for each, with `center` or `origin`, and `radius`.
-pub(super) fn parse_json(
-    bytes: &[u8],
-    name: &str,
-    options: ReadOptions,
-) -> Result<LoadedMa, MaError> {
+pub(super) fn parse_json(bytes: &[u8], name: &str, options: ReadOptions) -> Loaded {
     let document = serde_json::from_slice(bytes).map_err(|error| {
-        let line = Some(error.line()).filter(|&line| line > 0);
-        MaError { line, ..MaError::of(name, MaErrorKind::Malformed(error.to_string())) }
+        malformed(name, Some(error.line()).filter(|&line| line > 0), error.to_string())
     })?;
     from_document(&document, name, options)
 }
 
 /// [`parse_json`] for YAML: cuRobo's files, with or without the rest of the robot's configuration, and XRDF.
-pub(super) fn parse_yaml(
-    bytes: &[u8],
-    name: &str,
-    options: ReadOptions,
-) -> Result<LoadedMa, MaError> {
+pub(super) fn parse_yaml(bytes: &[u8], name: &str, options: ReadOptions) -> Loaded {
     // Every node of a text takes a byte. Aliases, which repeat nodes, have a limit of their own.
     let budget = serde_saphyr::budget! {
         max_nodes: bytes.len() + 1, max_events: 2 * bytes.len() + 8,
@@ -301,15 +272,14 @@ pub(super) fn parse_yaml(
         let text = error.to_string();
         let why = text.lines().next().unwrap_or_default().to_owned();
         let line = error.location().map(|location| location.line() as usize);
-        MaError { line, ..MaError::of(name, MaErrorKind::Malformed(why)) }
+        malformed(name, line, why)
     })?;
     from_document(&document, name, options)
 }
 
-fn from_document(document: &Value, name: &str, options: ReadOptions) -> Result<LoadedMa, MaError> {
+fn from_document(document: &Value, name: &str, options: ReadOptions) -> Loaded {
     let mut links = Vec::new();
-    collect(document, "", &mut links)
-        .map_err(|why| MaError::of(name, MaErrorKind::Malformed(why)))?;
+    collect(document, "", &mut links).map_err(|why| malformed(name, None, why))?;
     chosen(links, name, options)
 }
 
@@ -354,18 +324,10 @@ fn text(value: &Value) -> String {
 }
 
 /// Reads the spheres of a URDF or MJCF document; its root element decides.
-pub(super) fn parse_xml(
-    bytes: &[u8],
-    name: &str,
-    options: ReadOptions,
-) -> Result<LoadedMa, MaError> {
-    let malformed = |line: Option<u32>, why: String| MaError {
-        line: line.map(|line| line as usize),
-        ..MaError::of(name, MaErrorKind::Malformed(why))
-    };
-    let text = str::from_utf8(bytes).map_err(|error| malformed(None, error.to_string()))?;
+pub(super) fn parse_xml(bytes: &[u8], name: &str, options: ReadOptions) -> Loaded {
+    let text = str::from_utf8(bytes).map_err(|error| malformed(name, None, error.to_string()))?;
     let document = Document::parse(text)
-        .map_err(|error| malformed(Some(error.pos().row), error.to_string()))?;
+        .map_err(|error| malformed(name, Some(error.pos().row as usize), error.to_string()))?;
     let root = document.root_element().tag_name().name();
     let (owners, shape): (&[&str], &str) = match root {
         "robot" => (&["link"], "collision"),
@@ -373,7 +335,7 @@ pub(super) fn parse_xml(
         _ => {
             let found = shortened(root);
             let why = format!("unknown root element (found {found:?}, expected robot or mujoco)");
-            return Err(malformed(None, why));
+            return Err(malformed(name, None, why));
         }
     };
     let mut links = Vec::new();
@@ -386,8 +348,8 @@ pub(super) fn parse_xml(
                 link.others += 1;
                 continue;
             };
-            let row = document.text_pos_at(element.range().start).row;
-            let sphere = numbers(centre, radius).map_err(|why| malformed(Some(row), why))?;
+            let row = document.text_pos_at(element.range().start).row as usize;
+            let sphere = numbers(centre, radius).map_err(|why| malformed(name, Some(row), why))?;
             link.spheres.push(sphere);
         }
         links.push(link);
@@ -443,7 +405,7 @@ mod tests {
         });
         let mesh = MedialMesh::from_simplices(spheres.collect(), vec![[0, 1]], vec![]).unwrap();
         let folder = tempfile::tempdir().unwrap();
-        for extension in LAYOUTS.iter().flat_map(|layout| layout.extensions) {
+        for extension in LAYOUTS.iter().flat_map(|layout| layout.0) {
             assert!(WRITABLE.contains(extension));
             // A name that must be quoted in YAML and escaped in XML.
             let path = folder.path().join(format!("{{x}} & <\"12\">: 'a'.{extension}"));
