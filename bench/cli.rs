@@ -158,7 +158,6 @@ simplify
   medial simplify builtin:blob --spheres 100 -o blob.ma
   medial simplify builtin:blob --method qmat --max-error 0.01 -o blob.ma
   medial simplify builtin:blob --method angle --level 60 -o blob.glb
-  medial simplify builtin:bracket --method cover --spheres 32 --set mood=outside -o bracket.yaml
 axis
   medial axis builtin:blob -o blob.ma
   medial axis builtin:blob --dual delaunay --json
