@@ -65,7 +65,11 @@ fn spheres_of_a_link_are_written_read_and_measured() {
     done(&["render", "builtin:box:8", &yaml, "-o", &at("link.png")]);
     let list = r#"[{"center": [0, 0, 0], "radius": 1}]"#;
     std::fs::write(&two, format!("{{\"arm\": {list}, \"hand\": {list}}}")).expect("written");
-    refused(&["convert", &two, &at("x.csv")], 1, "2 links (1 arm, 2 hand); select one by --block K");
+    refused(
+        &["convert", &two, &at("x.csv")],
+        1,
+        "2 links (1 arm, 2 hand); select one by --block K",
+    );
     done(&["convert", &two, &at("x.csv"), "--block", "2"]);
     refused(&["convert", "builtin:box:8", &at("x.csv")], 2, "a surface, not a medial mesh");
 }
