@@ -60,10 +60,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         )));
     // A medial mesh of a surface is computed, not converted.
     } else if is_only_medial(&extension(&arguments.to)) {
+        let (from, to) = (arguments.from.display(), arguments.to.display());
+        let (verb, options) = match ["ma", "vtp", "glb"].contains(&&*extension(&arguments.to)) {
+            true => ("axis", ""),
+            false => ("simplify", " --method cover --spheres 32"),
+        };
         return Err(Failure::usage(format!(
-            "{0}: a surface, not a medial mesh; compute one by `medial axis {0} -o {1}`",
-            arguments.from.display(),
-            arguments.to.display()
+            "{from}: a surface, not a medial mesh; compute one by `medial {verb} {from}{options} -o {to}`"
         )));
     } else {
         let loaded = surface::read(&arguments.from).map_err(Failure::input)?;

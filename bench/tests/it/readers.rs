@@ -71,7 +71,7 @@ fn spheres_of_a_link_are_written_read_and_measured() {
         "2 links (1 arm, 2 hand); select one by --block K",
     );
     done(&["convert", &two, &at("x.csv"), "--block", "2"]);
-    refused(&["convert", "builtin:box:8", &at("x.csv")], 2, "a surface, not a medial mesh");
+    refused(&["convert", "builtin:box:8", &at("x.csv")], 2, "--method cover --spheres 32 -o ");
 }
 
 /// A sphere of radius 0.6 in the middle of the box, whose faces are 0.5 away, and one of 0.4.
