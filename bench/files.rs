@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
+use medial::complex::{READABLE, WRITABLE};
 use medial::shape::{Shape, ShapeOptions};
 
 use crate::exit::Failure;
@@ -29,7 +30,6 @@ const HEADER_LIMIT: u64 = 1 << 20;
 /// When it cannot be read.
 pub fn is_medial(path: &Path) -> Result<bool, Failure> {
     match extension(path).as_str() {
-        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => Ok(true),
         // Surfaces and medial meshes share these extensions: their first lines decide.
         "ply" => any_line(path, |words| match words {
             [b"end_header"] => Some(false),
@@ -40,7 +40,7 @@ pub fn is_medial(path: &Path) -> Result<bool, Failure> {
             [b"v", coordinates @ ..] => Some(coordinates.len() == 4),
             _ => None,
         }),
-        _ => Ok(false),
+        other => Ok(READABLE.contains(&other)),
     }
 }
 
@@ -67,12 +67,9 @@ fn any_line(path: &Path, decide: impl Fn(&[&[u8]]) -> Option<bool>) -> Result<bo
 pub fn check_output(output: Option<&Path>) -> Result<(), Failure> {
     let Some(path) = output else { return Ok(()) };
     // Methods can take hours: a wrong name must fail before them.
-    check_extension(path, &MEDIAL_MESHES)?;
+    check_extension(path, &WRITABLE)?;
     check_folder(path)
 }
-
-/// Extensions of medial meshes that are written.
-const MEDIAL_MESHES: [&str; 5] = ["ma", "ply", "obj", "vtp", "glb"];
 
 /// Corners of a power crust that are nearer than this along it become one in the surface that is written, as a
 /// fraction of the diagonal.

@@ -71,6 +71,14 @@ pub(crate) fn medial_ply(bytes: &[u8]) {
     }
 }
 
+pub(crate) fn spheres(bytes: &[u8]) {
+    for name in ["x.csv", "x.xyzr", "x.json", "x.yaml", "x.xml"] {
+        if let Ok(loaded) = complex::read_content(name, bytes, ReadOptions::default()) {
+            medial(&loaded);
+        }
+    }
+}
+
 pub(crate) fn medial_obj(bytes: &[u8]) {
     for radii in [Radii::Needed, Radii::NotNeeded] {
         let options = ReadOptions { radii, ..ReadOptions::default() };

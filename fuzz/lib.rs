@@ -14,7 +14,7 @@ mod kernels;
 pub type Target = fn(&[u8]);
 
 /// All targets, by name.
-pub const TARGETS: [(&str, Target); 15] = [
+pub const TARGETS: [(&str, Target); 16] = [
     ("off", formats::off),
     ("obj", formats::obj),
     ("ply", formats::ply),
@@ -24,6 +24,7 @@ pub const TARGETS: [(&str, Target); 15] = [
     ("ma_points", formats::ma_points),
     ("medial_ply", formats::medial_ply),
     ("medial_obj", formats::medial_obj),
+    ("spheres", formats::spheres),
     ("study", formats::study),
     ("plugins", formats::plugins),
     ("records", formats::records),

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes the pictures of README.md and docs/ from built-in shapes, in about 20 seconds.
+# Makes the pictures of README.md and docs/ from built-in shapes, in about 30 seconds.
 #
 #   scripts/pictures.sh [FOLDER]      FOLDER: where they are written [docs]
 #
@@ -21,3 +21,9 @@ three() {
 }
 three bracket 0.01
 three blob 0.004
+
+for mood in outside inside balanced; do
+    "$medial" simplify builtin:bracket --method cover --spheres 32 --set mood=$mood -o "$work/$mood.yaml"
+done
+"$medial" render builtin:bracket "$work/outside.yaml" "$work/inside.yaml" "$work/balanced.yaml" \
+    --show error --max-error 0.05 --size 262x200 -o "$folder/spheres.png"

@@ -62,6 +62,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let expected = shape.expected_betti();
     let mut warnings = shape.report().warnings.clone();
     warnings.extend(shape.sampling_warning());
+    warnings.extend(arguments.output.as_ref().and_then(|path| complex::left_out(path, &mesh)));
     if let Some(expected) = expected.filter(|&expected| expected != betti) {
         let advice = match shape.options().sampling {
             Sampling::Conforming { .. } => "",

@@ -14,22 +14,24 @@ use serde_json::json;
 
 use crate::args::{Global, MeshArgument};
 use crate::exit::{Exit, Failure};
-use crate::files::{check_extension, extension, is_medial, shape_of};
+use crate::files::{SURFACES, check_extension, extension, is_medial, shape_of};
 use crate::output::{print_json, print_line};
 use crate::study::external::{AxisOptions, read_axis};
 
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Surface (OFF, OBJ, PLY, STL) or medial mesh (.ma and its dialects, .ply or .obj with radii).
+    /// Surface (OFF, OBJ, PLY, STL), medial mesh (.ma and its dialects, .ply or .obj with radii), or list of spheres
+    /// (.csv, .json, .yaml, .xrdf, .urdf, .xml, .txt, .xyzr).
     from: PathBuf,
-    /// Surface (OFF, OBJ, PLY) or medial mesh (.ma, .ply, .obj, .vtp for ParaView, .glb for Blender and browsers).
+    /// Surface (OFF, OBJ, PLY), medial mesh (.ma, .ply, .obj, .vtp for ParaView, .glb for Blender and browsers), or list
+    /// of spheres: .csv, .json, .yaml (cuRobo), .xrdf (Isaac), .urdf, .xml (MuJoCo), .txt or .xyzr (clumps).
     /// `.glb` has single precision, and its upward axis y is z of the input.
     to: PathBuf,
     /// Read all lines of a medial mesh whose header states a different number.
     #[arg(long)]
     lenient: bool,
-    /// Read the K-th medial mesh of a file that holds several, counted from 1.
+    /// Read the K-th medial mesh, or link of a robot, of a file that holds several, counted from 1.
     #[arg(long, value_name = "K")]
     block: Option<usize>,
     #[command(flatten)]
@@ -49,6 +51,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         complex::write_with(&arguments.to, &loaded.mesh, &look).map_err(Failure::input)?;
         let (mesh, mut notes) = loaded.with_remarks();
         notes.extend(loss(&arguments.to, &mesh));
+        notes.extend(complex::left_out(&arguments.to, &mesh));
         (notes, mesh.spheres.len(), mesh.faces.len())
     } else if arguments.look.is_set() {
         let from = arguments.from.display();
@@ -56,11 +59,14 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
             "{from}: a surface has no colours; name a medial mesh"
         )));
     // A medial mesh of a surface is computed, not converted.
-    } else if ["ma", "vtp", "glb"].contains(&extension(&arguments.to).as_str()) {
+    } else if is_only_medial(&extension(&arguments.to)) {
+        let (from, to) = (arguments.from.display(), arguments.to.display());
+        let (verb, options) = match ["ma", "vtp", "glb"].contains(&&*extension(&arguments.to)) {
+            true => ("axis", ""),
+            false => ("simplify", " --method cover --spheres 32"),
+        };
         return Err(Failure::usage(format!(
-            "{0}: a surface, not a medial mesh; compute one by `medial axis {0} -o {1}`",
-            arguments.from.display(),
-            arguments.to.display()
+            "{from}: a surface, not a medial mesh; compute one by `medial {verb} {from}{options} -o {to}`"
         )));
     } else {
         let loaded = surface::read(&arguments.from).map_err(Failure::input)?;
@@ -80,6 +86,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         }
     }
     Ok(Exit::Done)
+}
+
+/// Whether an extension is written for medial meshes and not for surfaces.
+fn is_only_medial(extension: &str) -> bool {
+    complex::WRITABLE.contains(&extension) && !SURFACES.contains(&extension)
 }
 
 /// Options of formats for viewers.

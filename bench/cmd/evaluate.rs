@@ -23,7 +23,8 @@ use crate::study::external::{AxisOptions, read_axis};
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     mesh: MeshArgument,
-    /// Medial meshes (.ma and its dialects, or .ply or .obj with radii) in the units of the surface.
+    /// Medial meshes (.ma and its dialects, or .ply or .obj with radii), or lists of spheres (.csv, .json, .yaml, .xrdf,
+    /// .urdf, .xml, .txt), in the units of the surface.
     /// Several files give one table.
     #[arg(required = true, value_name = "X.ma")]
     axes: Vec<PathBuf>,

@@ -106,6 +106,8 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     line.at("checking the topology");
     simplify.warnings.extend(shape.sampling_warning());
     simplify.warnings.extend(topology_warnings(&simplified.mesh, &shape));
+    let output = arguments.outputs.output.as_ref();
+    warnings.extend(output.and_then(|path| complex::left_out(path, &simplified.mesh)));
     line.at("writing");
     arguments.outputs.write(&simplified, &shape)?;
     drop(line);
@@ -310,7 +312,8 @@ fn error_bound(text: &str) -> Result<f64, String> {
 /// Files to write.
 #[derive(Debug, Args)]
 struct Outputs {
-    /// Write the result (.ma, .ply, .obj, .vtp, .glb) in the units of the surface.
+    /// Write the result in the units of the surface: .ma, .ply, .obj, .vtp, .glb; or its spheres: .csv, .json, .yaml
+    /// (cuRobo), .xrdf, .urdf, .xml (MuJoCo), .txt, .xyzr.
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Write the voxels with their distance and flux (.csv), for methods on a lattice.

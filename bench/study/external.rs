@@ -475,7 +475,7 @@ pub struct AxisOptions {
     /// Read all lines of a medial mesh whose header states a different number.
     #[arg(long)]
     pub lenient: bool,
-    /// Read the K-th medial mesh of a file that holds several, counted from 1.
+    /// Read the K-th medial mesh, or link of a robot, of a file that holds several, counted from 1.
     #[arg(long, value_name = "K")]
     pub block: Option<usize>,
     /// Read radii from the file, or compute them where it has none or other numbers instead.
@@ -676,7 +676,7 @@ fn doubts(
 ) -> Result<Option<String>, ShapeError> {
     // The median: a medial mesh with a few wrong spheres is still of this surface.
     let misfit = shape.misfit(mesh)?.unwrap_or_default();
-    if misfit <= DOUBTFUL {
+    if misfit <= DOUBTFUL || covers(mesh, shape) {
         return Ok(None);
     }
     let differ = format!(
@@ -702,6 +702,15 @@ fn doubts(
     }
     Ok((misfit > WRONG)
         .then(|| format!("{differ}; check the surface, or compute radii by --radii surface")))
+}
+
+/// Whether a mesh is a list of spheres most of whose centres lie in the solid: spheres that cover it are larger than
+/// the distance to its surface in any unit.
+fn covers(mesh: &MedialMesh, shape: &Shape) -> bool {
+    let (units, inside) = (shape.normalisation(), shape.inside_test());
+    let is_within = |s: &&Sphere| inside.winding_number(units.forward(s.centre)) != Some(0);
+    let within = mesh.spheres.iter().filter(is_within);
+    mesh.edges.is_empty() && 2 * within.count() > mesh.spheres.len()
 }
 
 /// A fraction of the diagonal as a percentage with three significant digits.

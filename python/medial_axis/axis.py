@@ -98,11 +98,13 @@ class MedialAxis:
             self._axis, self.mesh = self.of(mesh)._axis, mesh
 
     @classmethod
-    def read(cls, path: str | os.PathLike[str]) -> MedialAxis:
+    def read(cls, path: str | os.PathLike[str], *, block: int | None = None) -> MedialAxis:
         """Reads a file; `Mesh.read_axis` does so with a surface.
 
         Args:
-            path: A `.ma` file in any dialect, `.ply` or `.obj`.
+            path: A `.ma` file in any dialect, `.ply` or `.obj`; or a list of spheres: `.csv`, `.json`, `.yaml` (cuRobo),
+                `.xrdf`, `.urdf`, `.xml` (MuJoCo), `.txt`, `.xyzr`.
+            block: Number of the mesh, or link of a robot, in a file with several, from 1.
 
         Returns:
             The medial mesh, without a surface; `.remarks` lists repairs.
@@ -115,7 +117,8 @@ class MedialAxis:
             >>> MedialAxis.read("point.ma")
             <MedialAxis: 1 spheres, 0 edges, 0 faces>
         """
-        axis, remarks = _medial.Axis.read(path_text(path))
+        block = None if block is None else whole(block, "block", 1, 2**31)
+        axis, remarks = _medial.Axis.read(path_text(path), block)
         return cls._of(axis, None, remarks=remarks)
 
     @classmethod
@@ -393,7 +396,9 @@ class MedialAxis:
         """Writes a file, completely or not at all.
 
         Args:
-            path: `.ma`, `.ply`, `.vtp` (ParaView), `.glb` (Blender, browsers), or `.obj` without radii.
+            path: `.ma`, `.ply`, `.vtp` (ParaView), `.glb` (Blender, browsers), or `.obj` without radii; for the spheres
+                alone `.csv`, `.json`, `.yaml` (cuRobo), `.xrdf`, `.urdf`, `.xml` (MuJoCo), `.txt`, `.xyzr`, with a
+                `MedialWarning` if edges are left out.
             color: For viewers: `radius` or `stability`.
             balls: For viewers: add the spheres themselves.
 
@@ -404,7 +409,9 @@ class MedialAxis:
         Example:
             >>> Mesh.read("builtin:box").medial_axis().save("box.glb", color="stability")
         """
-        self._axis.save(path_text(path), color, bool(balls))
+        left_out = self._axis.save(path_text(path), color, bool(balls))
+        if left_out is not None:
+            warnings.warn(left_out, MedialWarning, stacklevel=2)
 
     def plot(self, *, backend: Backend | None = None, screenshot: str | os.PathLike[str] | None = None) -> Any:
         """Shows it in its surface: in a window or a notebook by PyVista where that is installed, else as a PNG.

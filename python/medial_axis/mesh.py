@@ -262,12 +262,12 @@ class Mesh:
         """Reads a medial mesh of this surface.
 
         Args:
-            path: A `.ma` file in any dialect, `.ply` or `.obj`.
+            path: A file that `MedialAxis.read` reads.
             fit: `none`: the file has the unit of the surface. `similarity` finds scale and translation; `auto` does if the
                 spheres do not fit otherwise.
             radii: `surface` gives spheres without radii their distance to the surface.
             lenient: Read all lines if the header states a different number.
-            block: Number of the mesh in a file with several, from 1.
+            block: Number of the mesh, or link of a robot, in a file with several, from 1.
             threads: Threads of a separate pool; by default all calls share one.
             progress: Called with a stage and its completed share.
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use medial::Vec3;
 use medial::complex::{
-    self, Contacts, DualTriangulation, Look, MedialMesh, MedialUnion, SphereValues,
+    self, Contacts, DualTriangulation, Look, MedialMesh, MedialUnion, ReadOptions, SphereValues,
 };
 use medial::geometry::Sphere;
 use medial::metrics::JudgeOptions;
@@ -127,10 +127,12 @@ impl Axis {
         Ok(Self::new(mesh, None))
     }
 
-    /// The mesh in a file, and remarks on it.
+    /// The mesh in a file, or one of several (`block`, from 1), and remarks on it.
     #[staticmethod]
-    fn read(path: &str) -> PyResult<(Self, Vec<String>)> {
-        let (mesh, remarks) = complex::read(Path::new(path)).map_err(Failure::from)?.with_remarks();
+    fn read(path: &str, block: Option<usize>) -> PyResult<(Self, Vec<String>)> {
+        let options = ReadOptions { block, ..ReadOptions::default() };
+        let loaded = complex::read_with(Path::new(path), options).map_err(Failure::from)?;
+        let (mesh, remarks) = loaded.with_remarks();
         Ok((Self::new(mesh, None), remarks))
     }
 
@@ -232,7 +234,7 @@ impl Axis {
     }
 
     /// Writes it by the extension of the path, for viewers coloured by these values.
-    fn save(&self, path: PathBuf, color: Option<&str>, balls: bool) -> PyResult<()> {
+    fn save(&self, path: PathBuf, color: Option<&str>, balls: bool) -> PyResult<Option<String>> {
         let values = match color {
             None => None,
             Some("stability") => Some(SphereValues::stability(&self.mesh, 1.0)),
@@ -242,7 +244,9 @@ impl Axis {
                 return Err(Failure::parameter(message).into());
             }
         };
-        Ok(complex::write_with(path, &self.mesh, &Look { values, balls }).map_err(Failure::from)?)
+        let left_out = complex::left_out(&path, &self.mesh);
+        complex::write_with(path, &self.mesh, &Look { values, balls }).map_err(Failure::from)?;
+        Ok(left_out)
     }
 
     /// A simplification by a method, at a level, and the facts of the run as JSON.

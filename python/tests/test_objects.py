@@ -90,6 +90,25 @@ def test_every_format_is_written_and_those_of_data_come_back(axis: MedialAxis, e
     assert (back.faces == simplified.faces).all()
 
 
+@pytest.mark.parametrize("extension", ["csv", "json", "yaml", "xrdf", "urdf", "xml", "txt", "xyzr"])
+def test_lists_of_spheres_come_back_without_their_edges(axis: MedialAxis, extension: str, tmp_path: Path) -> None:
+    simplified = axis.simplify("qmat", spheres=30)
+    path = tmp_path / f"arm.{extension}"
+    with pytest.warns(medial_axis.MedialWarning, match=f"left out .* edges and .* faces: .{extension} holds spheres alone"):
+        simplified.save(path)
+    back = MedialAxis.read(path)
+    assert (back.centres == simplified.centres).all() and (back.radii == simplified.radii).all()
+    assert len(back.edges) == 0
+
+
+def test_one_link_of_a_robot_is_chosen(tmp_path: Path) -> None:
+    links = {link: [{"center": [0, 0, k], "radius": 1}] for k, link in enumerate(["arm", "hand"])}
+    (tmp_path / "robot.json").write_text(json.dumps(links))
+    with pytest.raises(InputError, match=r"2 links \(1 arm, 2 hand\)"):
+        MedialAxis.read(tmp_path / "robot.json")
+    assert MedialAxis.read(tmp_path / "robot.json", block=2).centres.tolist() == [[0, 0, 1]]
+
+
 def test_a_file_in_other_units_is_fitted(blob: Mesh, axis: MedialAxis, tmp_path: Path) -> None:
     simplified = axis.simplify("qmat", spheres=50)
     path = tmp_path / "scaled.ma"

@@ -52,6 +52,28 @@ fn viewer_formats_are_written_and_never_read() {
     assert!(object["warnings"].to_string().contains(warning), "{object}");
 }
 
+#[test]
+fn spheres_of_a_link_are_written_read_and_measured() {
+    let at = folder();
+    let (yaml, two) = (at("link.yaml"), at("two.json"));
+    let simplify = ["simplify", "builtin:box:8", "-m", "qmat", "--spheres", "8", "-o", &yaml];
+    let (_, object) = json(&simplify);
+    assert!(object["warnings"].to_string().contains(".yaml holds spheres alone"), "{object}");
+    done(&["convert", &yaml, &at("link.urdf")]);
+    let (code, object) = json(&["evaluate", "builtin:box:8", &at("link.urdf")]);
+    assert_eq!((code, object.to_string().contains("uncovered")), (0, true), "{object}");
+    done(&["render", "builtin:box:8", &yaml, "-o", &at("link.png")]);
+    let list = r#"[{"center": [0, 0, 0], "radius": 1}]"#;
+    std::fs::write(&two, format!("{{\"arm\": {list}, \"hand\": {list}}}")).expect("written");
+    refused(
+        &["convert", &two, &at("x.csv")],
+        1,
+        "2 links (1 arm, 2 hand); select one by --block K",
+    );
+    done(&["convert", &two, &at("x.csv"), "--block", "2"]);
+    refused(&["convert", "builtin:box:8", &at("x.csv")], 2, "--method cover --spheres 32 -o ");
+}
+
 /// A sphere of radius 0.6 in the middle of the box, whose faces are 0.5 away, and one of 0.4.
 #[test]
 fn errors_are_radii_less_depths() {

@@ -120,17 +120,17 @@ pub(super) fn write_ma(out: &mut dyn Write, mesh: &MedialMesh) -> io::Result<()>
 // Lines and words, with the place of each for error messages.
 
 /// A line that holds something.
-struct Line<'a> {
+pub(super) struct Line<'a> {
     file: &'a str,
     number: usize,
-    text: Cow<'a, str>,
+    pub(super) text: Cow<'a, str>,
 }
 
 /// The lines of `bytes` that are neither empty nor comments (`#`), numbered from 1.
 ///
 /// Bytes that are not UTF-8 become replacement characters: harmless in a comment, and refused
 /// with their line number anywhere else.
-fn lines<'a>(bytes: &'a [u8], file: &'a str) -> impl Iterator<Item = Line<'a>> {
+pub(super) fn lines<'a>(bytes: &'a [u8], file: &'a str) -> impl Iterator<Item = Line<'a>> {
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     bytes.split(|&byte| byte == b'\n').enumerate().filter_map(move |(index, raw)| {
         let content = raw.split(|&byte| byte == b'#').next().unwrap_or(raw).trim_ascii();
@@ -144,7 +144,7 @@ impl Line<'_> {
         Words { line: self, rest: self.text.split_ascii_whitespace() }
     }
 
-    fn malformed(&self, why: impl Into<String>) -> MaError {
+    pub(super) fn malformed(&self, why: impl Into<String>) -> MaError {
         let kind = MaErrorKind::Malformed(why.into());
         MaError { file: self.file.to_owned(), line: Some(self.number), kind }
     }
@@ -187,13 +187,13 @@ impl<'a> Words<'a> {
     }
 }
 
-fn finite(text: &str, field: &'static str) -> Result<f64, String> {
+pub(super) fn finite(text: &str, field: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
     number.ok_or_else(|| format!("the {field} {:?} is not a finite number", shortened(text)))
 }
 
 /// A word as it may be repeated in a message.
-fn shortened(text: &str) -> String {
+pub(super) fn shortened(text: &str) -> String {
     const LIMIT: usize = 40;
     match text.char_indices().nth(LIMIT) {
         Some((end, _)) => format!("{}...", &text[..end]),
@@ -816,7 +816,7 @@ fn sort_once<T: Ord>(simplices: &mut Vec<T>, what: &str, notes: &mut Vec<String>
 }
 
 /// Reports a change of a number of things, if there are any.
-fn note(notes: &mut Vec<String>, count: usize, one: &str, verb: &str) {
+pub(super) fn note(notes: &mut Vec<String>, count: usize, one: &str, verb: &str) {
     match (count, one.split_once(' ')) {
         (0, _) => {}
         (1, _) => notes.push(format!("1 {one} was {verb}")),

@@ -3,7 +3,9 @@
 //! | extension | read | written | holds |
 //! |---|---|---|---|
 //! | `.ma` | yes | yes | spheres, edges, faces: the interchange format of the field, in all its dialects |
-//! | `.ma_dup`, `.sph`, `.txt`, `.xyzr` | yes | no | the same, and lists of spheres alone |
+//! | `.ma_dup`, `.sph` | yes | no | the same, and lists of spheres alone |
+//! | `.txt`, `.xyzr` | yes | rows `x y z r` | the same; written for granular simulations |
+//! | `.csv`, `.json`, `.yaml`, `.yml`, `.xrdf`, `.urdf`, `.xml` | yes | yes | spheres alone, of one link of a robot |
 //! | `.ply` | yes | text | the same, with a vertex property `radius`, for viewers |
 //! | `.obj` | yes | yes | centres, edges (`l`) and faces (`f`); read with radii as fourth numbers (`v x y z r`), written without, for viewers |
 //! | `.vtp` | no | base64 | the same as `.ma` and a value at each sphere, for ParaView |
@@ -14,6 +16,7 @@
 
 mod glb;
 mod ma;
+mod spheres;
 mod viewers;
 
 use std::fmt;
@@ -23,6 +26,7 @@ use std::path::Path;
 
 pub use glb::single_precision_loss;
 pub use ma::{parse_ma, parse_obj};
+pub use spheres::left_out;
 pub use viewers::{Look, SphereValues, parse_ply};
 
 use super::{ComplexError, MedialMesh};
@@ -65,7 +69,8 @@ impl LoadedMa {
 pub struct ReadOptions {
     /// Takes the lines as they are where the header announces another number of them, with a warning.
     pub lenient: bool,
-    /// Which medial mesh of a file with several appended ones, from 1. Without it such a file is rejected.
+    /// Which medial mesh of a file with several appended ones, or link of a robot, from 1. Without it such a file is
+    /// rejected.
     pub block: Option<usize>,
     /// Whether the radii of the file are wanted.
     pub radii: Radii,
@@ -125,6 +130,18 @@ pub enum MaErrorKind {
     Points,
 }
 
+/// Extensions of the files that [`read`] reads.
+pub const READABLE: [&str; 14] = [
+    "ma", "ma_dup", "sph", "txt", "xyzr", "ply", "obj", "csv", "json", "yaml", "yml", "xrdf",
+    "urdf", "xml",
+];
+
+/// Extensions of the files that [`write()`] writes.
+pub const WRITABLE: [&str; 14] = [
+    "ma", "ply", "obj", "vtp", "glb", "csv", "json", "yaml", "yml", "xrdf", "urdf", "xml", "txt",
+    "xyzr",
+];
+
 /// Reads a medial mesh from a `.ma` file, a list of spheres, a `.ply` file or an `.obj` file with radii. The
 /// extension decides.
 ///
@@ -163,18 +180,24 @@ type Parser<'a> = fn(&'a [u8], &str, ReadOptions) -> Result<LoadedMa, MaError>;
 
 fn parser<'a>(path: &Path) -> Result<Parser<'a>, MaError> {
     match extension(path).as_str() {
-        "ma" | "ma_dup" | "sph" | "txt" | "xyzr" => Ok(parse_ma),
+        "ma" | "ma_dup" | "sph" => Ok(parse_ma),
+        "txt" | "xyzr" => Ok(spheres::parse_clump),
         "ply" => Ok(parse_ply),
         "obj" => Ok(parse_obj),
+        "csv" => Ok(spheres::parse_rows),
+        "json" => Ok(spheres::parse_json),
+        "yaml" | "yml" | "xrdf" => Ok(spheres::parse_yaml),
+        "urdf" | "xml" => Ok(spheres::parse_xml),
         other => {
-            let known = ".ma, .ma_dup, .sph, .txt, .xyzr, .ply, .obj";
-            let why = format!("the extension {other:?} is not one of {known}");
+            let known = READABLE.join(", .");
+            let why = format!("the extension {other:?} is not one of .{known}");
             Err(MaError::of(path.display(), MaErrorKind::Malformed(why)))
         }
     }
 }
 
-/// Writes a medial mesh as `.ma`, `.ply`, `.obj`, `.vtp` or `.glb`. The extension decides.
+/// Writes a medial mesh as `.ma`, `.ply`, `.obj`, `.vtp` or `.glb`, or its spheres alone in the other formats of
+/// [`WRITABLE`]. The extension decides.
 ///
 /// The file appears under its name only when it is complete: it is written next to the target
 /// and renamed. Contact points are not part of any of these formats.
@@ -216,15 +239,15 @@ fn write_as(
     mesh: &MedialMesh,
     look: &Look,
 ) -> Result<(), MaErrorKind> {
+    if !WRITABLE.contains(&extension) {
+        let why = format!("the extension {extension:?} is not one of .{}", WRITABLE.join(", ."));
+        return Err(MaErrorKind::Unwritable(why));
+    }
     let lacks = match extension {
-        "ma" | "ply" | "obj" | "vtp" if look.balls => Some("spheres as bodies; write .glb"),
-        "ma" | "ply" | "obj" if look.values.is_some() => Some("values; write .vtp or .glb"),
-        "ma" | "ply" | "obj" | "vtp" | "glb" => None,
-        _ => {
-            let known = ".ma, .ply, .obj, .vtp, .glb";
-            let why = format!("the extension {extension:?} is not one of {known}");
-            return Err(MaErrorKind::Unwritable(why));
-        }
+        "glb" => None,
+        _ if look.balls => Some("spheres as bodies; write .glb"),
+        "vtp" => None,
+        _ => look.values.as_ref().map(|_| "values; write .vtp or .glb"),
     };
     if let Some(lacks) = lacks {
         return Err(MaErrorKind::Unwritable(format!("{extension:?} files hold no {lacks}")));
@@ -235,10 +258,14 @@ fn write_as(
         "ply" => write_atomically(path, |out| viewers::write_ply(out, mesh))?,
         "obj" => write_atomically(path, |out| viewers::write_obj(out, mesh))?,
         "vtp" => write_atomically(path, |out| viewers::write_vtp(out, mesh, look))?,
-        _ => {
+        "glb" => {
             let bytes = glb::file(mesh, look).map_err(MaErrorKind::Unwritable)?;
             write_atomically(path, |out| out.write_all(&bytes))?;
         }
+        _ if mesh.spheres.is_empty() => {
+            return Err(MaErrorKind::Unwritable("no sphere to write".to_owned()));
+        }
+        _ => write_atomically(path, |out| spheres::write_spheres(out, path, mesh))?,
     }
     Ok(())
 }
