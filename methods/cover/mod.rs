@@ -81,7 +81,7 @@ const MOST_REPEATED: usize = 4;
 const SWEEPS: [usize; 2] = [3, 3];
 
 /// Width of a round's certified interval of `G`, as a share of it.
-const ROUGH: f64 = 0.1;
+const ROUGH: f64 = 0.02;
 
 /// Width of the certified interval of `G`, as a share of it.
 const WIDTH: f64 = 0.005;
@@ -188,7 +188,7 @@ impl Simplification for PreparedCover<'_> {
 
 impl PreparedCover<'_> {
     fn test(&self) -> CoverTest<'_> {
-        CoverTest::new(&self.shape.mesh().vertices, &self.tree, &self.inside)
+        CoverTest::new(self.shape.mesh(), &self.tree, &self.inside)
     }
 
     /// The certified interval of `G`, no wider than `width`, or than the least multiple that can be certified: where the

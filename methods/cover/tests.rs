@@ -33,7 +33,7 @@ fn run(shape: &Shape, mood: &str, level: Level) -> Result<Simplified, SimplifyEr
 /// The upper ends of both certified errors.
 fn errors(shape: &Shape, result: &Simplified) -> [f64; 2] {
     let (tree, inside) = (shape.surface_tree().expect("a tree"), shape.inside_test());
-    let test = CoverTest::new(&shape.mesh().vertices, &tree, &inside);
+    let test = CoverTest::new(shape.mesh(), &tree, &inside);
     let balls = &result.mesh.spheres;
     [test.uncovered(balls, 1e-4), test.overshoot(balls, 1e-4)].map(|e| e.expect("balls").upper)
 }

@@ -22,6 +22,11 @@
 //! 4. Everything else is bounded by distances being 1-Lipschitz. For cones and slabs this is the only
 //!    bound, and `sigma` comes from the tree of [`MedialUnion`] in place of lists.
 //!
+//! 5. Where the surface is about to be uncovered everywhere by the same distance, as on tubes, 4 alone would need cubes as small
+//!    as the tolerance. So a convex function `g >= sigma` bounds it to second order: the signed distance to one ball, or the mean
+//!    of two, with weights that leave no slope along the surface. The largest `g` in the part of a cube in K is at a corner of
+//!    the cube in K or on the surface, and there at a corner of a triangle that is cut to the cube.
+//!
 //! All cubes of one size are evaluated in one round, so the result is the same for any number of
 //! threads.
 //!
@@ -39,7 +44,7 @@ use crate::Vec3;
 use crate::complex::{MedialUnion, UnionError};
 use crate::geometry::Sphere;
 use crate::geometry::trees::Bounds;
-use crate::surface::{Closest, InsideTest, Side, TriangleBvh};
+use crate::surface::{Closest, InsideTest, Side, TriMesh, TriangleBvh};
 
 /// Half diagonal of the smallest cubes that a proof of zero divides, in diagonals of the surface.
 pub const SMALLEST: f64 = 1e-6;
@@ -52,6 +57,9 @@ const MOST_FOR_ZERO_OF_MESH: usize = 1 << 16;
 
 /// Cubes of a round at most: about 1 GB.
 const MOST: usize = 1 << 22;
+
+/// Triangles near a cube up to which they are cut to it.
+const MOST_CUT: usize = 12;
 
 /// Half the diagonal of a cube of half side 1.
 const HALF_DIAGONAL: f64 = 1.732_050_807_568_877_3;
@@ -72,15 +80,17 @@ pub struct OneSided {
 /// outward-oriented surface with a diagonal of about 1.
 #[derive(Clone, Copy, Debug)]
 pub struct CoverTest<'a> {
+    surface: &'a TriMesh,
     tree: &'a TriangleBvh,
     inside: &'a InsideTest,
     bounds: Bounds,
 }
 
 impl<'a> CoverTest<'a> {
-    /// The solid with these vertices on its surface.
-    pub fn new(vertices: &[Vec3], tree: &'a TriangleBvh, inside: &'a InsideTest) -> Self {
-        Self { tree, inside, bounds: Bounds::of_points(vertices.iter().copied()) }
+    /// The solid in a surface, whose tree and inside test are given.
+    pub fn new(surface: &'a TriMesh, tree: &'a TriangleBvh, inside: &'a InsideTest) -> Self {
+        let bounds = Bounds::of_points(surface.vertices.iter().copied());
+        Self { surface, tree, inside, bounds }
     }
 
     /// The largest distance from a point of the solid to the union of the balls, in an interval no
@@ -204,7 +214,17 @@ impl<'a> CoverTest<'a> {
     fn uncovered_in(&self, balls: &[Sphere], cube: &Cube, enough: f64) -> Bound {
         let (q, reach) = (cube.centre, cube.reach());
         let over = |i: &u32| balls[*i as usize].signed_distance(q);
-        let signed = cube.balls.iter().map(over).fold(f64::INFINITY, f64::min);
+        // The nearest ball, and the next.
+        let mut near = [(f64::INFINITY, cube.balls[0]); 2];
+        for i in &cube.balls {
+            let now = (over(i), *i);
+            if now.0 < near[0].0 {
+                near = [now, near[0]];
+            } else if now.0 < near[1].0 {
+                near[1] = now;
+            }
+        }
+        let signed = near[0].0;
         let mut upper = signed + reach;
         for &i in &cube.balls {
             let Sphere { centre, radius } = balls[i as usize];
@@ -230,9 +250,66 @@ impl<'a> CoverTest<'a> {
                 place = Place::Inside;
             }
         }
+        let two = near.map(|(_, i)| balls[i as usize]);
+        if reached <= enough {
+            upper = upper.min(self.second_order(two, cube, place, enough));
+            if upper <= enough {
+                return Bound { reached, at, ..Bound::closed(upper) };
+            }
+        }
         // No ball that is farther than this from `q` is the nearest one within `reach` of it.
         let list = cube.balls.iter().copied().filter(|i| over(i) <= signed + 2.0 * reach);
         Bound { reached, at, upper, place, balls: list.collect() }
+    }
+
+    /// A bound on the distance to the nearer of two balls in the part of a cube in the solid, by item 5; infinite if it is
+    /// more than `enough` for sure.
+    fn second_order(&self, [a, b]: [Sphere; 2], cube: &Cube, place: Place, enough: f64) -> f64 {
+        let (q, half) = (cube.centre, cube.half);
+        let (mut cut, mut normal) = (Vec::new(), Vec3::ZERO);
+        if let Place::Near(face) = place {
+            let (mut faces, mut count) = ([0; MOST_CUT], 0);
+            self.tree.each_within(q, cube.reach() + ROUNDING, |face, _| {
+                if count < MOST_CUT {
+                    faces[count] = face;
+                }
+                count += 1;
+            });
+            if count > MOST_CUT {
+                return f64::INFINITY;
+            }
+            for &face in &faces[..count] {
+                cut_to_cube(self.surface.triangle(face as usize), q, half, &mut cut);
+            }
+            let [u, v, w] = self.surface.triangle(face.unwrap_or(faces[0]) as usize);
+            normal = (v - u).cross(w - u).normalize_or_zero();
+        }
+        let [ga, gb] = [a, b].map(|ball| {
+            let slope = (q - ball.centre).normalize_or_zero();
+            slope - slope.dot(normal) * normal
+        });
+        let level = (gb.dot(gb - ga) / (gb - ga).length_squared()).clamp(0.0, 1.0);
+        let corners = (0..8_u32).map(|octant| {
+            let sign = |bit: u32| if octant >> bit & 1 == 1 { half } else { -half };
+            q + Vec3::new(sign(0), sign(1), sign(2))
+        });
+        let weights = [1.0, level].into_iter().filter(|weight| weight.is_finite());
+        let bounds = weights.map(|weight| {
+            let g = |p: Vec3| weight * a.signed_distance(p) + (1.0 - weight) * b.signed_distance(p);
+            let mut most = cut.iter().map(|&p| g(p)).fold(f64::NEG_INFINITY, f64::max);
+            for corner in corners.clone() {
+                if most > enough {
+                    return f64::INFINITY;
+                }
+                let is_larger = g(corner) > most;
+                let is_inner = matches!(place, Place::Inside);
+                if is_larger && (is_inner || self.inside.side(corner) != Side::Outside) {
+                    most = g(corner);
+                }
+            }
+            if most > enough { f64::INFINITY } else { most }
+        });
+        bounds.fold(f64::INFINITY, f64::min)
     }
 
     fn overshoot_in(&self, balls: &[Sphere], most: &[f64], cube: &Cube, enough: f64) -> Bound {
@@ -269,6 +346,27 @@ impl<'a> CoverTest<'a> {
         };
         Bound { reached, at, upper, place: cube.place, balls: list }
     }
+}
+
+/// Adds the corners of the part of a triangle in a cube.
+fn cut_to_cube(triangle: [Vec3; 3], centre: Vec3, half: f64, corners: &mut Vec<Vec3>) {
+    let mut polygon = triangle.to_vec();
+    for (axis, side) in (0..3).flat_map(|axis| [(axis, 1.0), (axis, -1.0)]) {
+        let beyond = |p: Vec3| side * (p[axis] - centre[axis]) - half;
+        let mut kept = Vec::with_capacity(polygon.len() + 1);
+        for (k, &p) in polygon.iter().enumerate() {
+            let next = polygon[(k + 1) % polygon.len()];
+            let (here, there) = (beyond(p), beyond(next));
+            if here <= 0.0 {
+                kept.push(p);
+            }
+            if (here <= 0.0) != (there <= 0.0) {
+                kept.push(p.lerp(next, here / (here - there)));
+            }
+        }
+        polygon = kept;
+    }
+    corners.extend(polygon);
 }
 
 /// # Errors
@@ -443,7 +541,7 @@ mod tests {
     /// Both errors, of which each interval is no wider than the tolerance.
     fn errors(mesh: &TriMesh, balls: &[Sphere], tolerance: f64) -> [OneSided; 2] {
         let (tree, inside) = (TriangleBvh::new(mesh).unwrap(), InsideTest::new(mesh));
-        let test = CoverTest::new(&mesh.vertices, &tree, &inside);
+        let test = CoverTest::new(&mesh, &tree, &inside);
         let both = [test.uncovered(balls, tolerance), test.overshoot(balls, tolerance)];
         both.map(|interval| {
             let interval = interval.unwrap();
@@ -506,7 +604,7 @@ mod tests {
         sides(Vec3::new(0.4, 0.1, 0.05), Vec3::ZERO, false, &mut mesh);
         sides(Vec3::new(0.1, 0.2, 0.05), Vec3::new(0.2, 0.4, 0.0), false, &mut mesh);
         let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
-        let test = CoverTest::new(&mesh.vertices, &tree, &inside);
+        let test = CoverTest::new(&mesh, &tree, &inside);
         let mut random = Pcg64::seed_from_u64(5);
         let mut point =
             |scale: f64| scale * Vec3::from([0; 3].map(|_| random.random_range(-1.0..1.0)));
@@ -542,7 +640,7 @@ mod tests {
         let mut mesh = TriMesh::default();
         sides(Vec3::new(0.4, 0.2, 0.05), Vec3::ZERO, false, &mut mesh);
         let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
-        let test = CoverTest::new(&mesh.vertices, &tree, &inside);
+        let test = CoverTest::new(&mesh, &tree, &inside);
         let mut random = Pcg64::seed_from_u64(7);
         let mut point =
             |scale: Vec3| scale * Vec3::from([0; 3].map(|_| random.random_range(-1.0..1.0)));
@@ -588,7 +686,7 @@ mod tests {
     fn a_capsule_is_covered_by_its_cone() {
         let mesh = cube(0.05);
         let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
-        let test = CoverTest::new(&mesh.vertices, &tree, &inside);
+        let test = CoverTest::new(&mesh, &tree, &inside);
         let ends = [-0.05, 0.05].map(|x| Sphere::new(Vec3::new(x, 0.0, 0.0), 0.08));
         let rod = MedialMesh::from_simplices(ends.to_vec(), vec![[0, 1]], vec![]).unwrap();
         let [uncovered, overshoot] =
@@ -602,7 +700,7 @@ mod tests {
     fn unmeasurable_balls_are_errors() {
         let mesh = cube(0.25);
         let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
-        let test = CoverTest::new(&mesh.vertices, &tree, &inside);
+        let test = CoverTest::new(&mesh, &tree, &inside);
         assert!(matches!(test.uncovered(&[], 1e-3), Err(MetricError::Union(_))));
         let balls = [Sphere::new(Vec3::ZERO, 0.1)];
         assert_eq!(test.overshoot(&balls, 0.0), Err(MetricError::Tolerance(0.0)));

@@ -233,7 +233,7 @@ impl Judge {
     pub fn cover(&self, mesh: &MedialMesh, tolerance: f64) -> Result<Cover, MetricError> {
         let samples = self.samples()?;
         let (mesh, union) = samples.ordered(mesh)?;
-        let test = CoverTest::new(&self.surface.vertices, &self.tree, &self.inside);
+        let test = CoverTest::new(&self.surface, &self.tree, &self.inside);
         let [uncovered, overshoot] = match mesh.edges.is_empty() {
             true => [
                 test.uncovered(&mesh.spheres, tolerance)?,
