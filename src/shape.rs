@@ -375,7 +375,7 @@ impl Substrate {
 pub struct Cost {
     /// Wall-clock seconds.
     pub seconds: f64,
-    /// Seconds of the whole process on all processors.
+    /// Seconds of the whole process on all processors, on Linux with those of the programs that it ran.
     pub cpu_seconds: f64,
     /// Bytes of the heap; 0 in a program that does not count them (see [`crate::heap`]).
     #[serde(default)]
@@ -395,11 +395,21 @@ impl Cost {
     }
 
     fn clocked<T>(work: impl FnOnce() -> (T, Usage)) -> (T, Self) {
-        let (wall, cpu) = (Instant::now(), ProcessTime::now());
+        let (wall, cpu, programs) = (Instant::now(), ProcessTime::now(), seconds_of_programs());
         let (value, usage) = work();
-        let (seconds, cpu_seconds) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+        let seconds = wall.elapsed().as_secs_f64();
+        let cpu_seconds = cpu.elapsed().as_secs_f64() + (seconds_of_programs() - programs);
         (value, Self { seconds, cpu_seconds, usage })
     }
+}
+
+/// Processor time of the ended child processes, to a hundredth of a second; 0 where the system does not list it.
+fn seconds_of_programs() -> f64 {
+    let Ok(stat) = std::fs::read_to_string("/proc/self/stat") else { return 0.0 };
+    // The name of the program, in parentheses, can contain spaces.
+    let fields = stat.rsplit(')').next().unwrap_or_default().split_whitespace();
+    let ticks: u64 = fields.skip(13).take(2).filter_map(|field| field.parse::<u64>().ok()).sum();
+    ticks as f64 / 100.0
 }
 
 impl std::ops::AddAssign for Cost {

@@ -541,7 +541,7 @@ mod tests {
     /// Both errors, of which each interval is no wider than the tolerance.
     fn errors(mesh: &TriMesh, balls: &[Sphere], tolerance: f64) -> [OneSided; 2] {
         let (tree, inside) = (TriangleBvh::new(mesh).unwrap(), InsideTest::new(mesh));
-        let test = CoverTest::new(&mesh, &tree, &inside);
+        let test = CoverTest::new(mesh, &tree, &inside);
         let both = [test.uncovered(balls, tolerance), test.overshoot(balls, tolerance)];
         both.map(|interval| {
             let interval = interval.unwrap();
