@@ -333,10 +333,10 @@ impl Judge {
             let radius = mesh.spheres[0].radius;
             let is_chosen = mesh.spheres[1..].iter().all(|s| s.radius == radius)
                 || beyond[0] > 0.0 && beyond[2] < 1.1 * beyond[0];
-            let off = !(2.0 / 3.0..=1.5).contains(&median) && !is_chosen;
+            let off = !(2.0 / 3.0..=1.5).contains(&median);
             // The same factor for all radii is not the work of a simplification.
             let scaled = (median - 1.0).abs() > 0.1 && high < 1.1 * low;
-            if off || scaled {
+            if (off || scaled) && !is_chosen {
                 let times = match median {
                     0.01..1000.0 => format!("{median:.3}"),
                     _ => format!("{median:.1e}"),
