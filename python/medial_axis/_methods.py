@@ -162,6 +162,7 @@ class Cover(Options, total=False):
     """Options of `cover`."""
 
     mood: Literal["balanced", "outside", "inside"]
+    radii: Literal["free", "equal"]
 
 
 class Simplify(Protocol):

@@ -99,6 +99,10 @@ class Evaluation:
     samples: int
     reverse_samples: int
     volume_error: Annotated[float | None, "fraction of the solid's volume"]
+    volume_ratio: Annotated[float | None, "volume of the union over the solid's"]
+    cover: dict[str, Any] | None = field(hash=False)
+    """One-sided errors, of spheres without edges or with a certificate: `uncovered` and `overshoot` in certified
+    intervals, and means. METHODOLOGY.md defines the keys."""
     protrusion: Annotated[float | None, _DIAGONAL]
     """How far the union's boundary reaches out of the solid."""
     centres_outside: Annotated[float | None, "share of the spheres"]
@@ -158,6 +162,8 @@ class Evaluation:
             certified=certified,
             axis=values.get("axis"),
             structure=values.get("structure"),
+            cover=values.get("cover"),
+            volume_ratio=values.get("volume_ratio"),
             quality=TriangleQuality(**values["quality"]),
             spikes=Spikes(**spikes),
             counts=Counts(**values["counts"]),
@@ -251,6 +257,9 @@ class Evaluation:
         if self.certified is not None:
             lower, upper = percent(self.certified.lower), percent(self.certified.upper)
             lines.append(f"  Hausdorff, certified    {lower} to {upper}")
+        if self.cover is not None:
+            for name in ("uncovered", "overshoot"):
+                lines.append(f"  {name}, at most      {percent(self.cover[name]['upper'])}")
         return "\n".join(lines + [f"  warning: {warning}" for warning in self.warnings])
 
 

@@ -331,8 +331,9 @@ impl Judge {
         {
             // Equal radii, and those that exceed the distances by the same, enclose a solid on purpose.
             let radius = mesh.spheres[0].radius;
-            let is_chosen = mesh.spheres[1..].iter().all(|s| s.radius == radius)
-                || beyond[0] > 0.0 && beyond[2] < 1.1 * beyond[0];
+            let is_equal = mesh.spheres[1..].iter().all(|s| s.radius == radius);
+            let is_offset = beyond[0] > 0.0 && beyond[2] < 1.1 * beyond[0];
+            let is_chosen = mesh.edges.is_empty() && (is_equal || is_offset);
             let off = !(2.0 / 3.0..=1.5).contains(&median);
             // The same factor for all radii is not the work of a simplification.
             let scaled = (median - 1.0).abs() > 0.1 && high < 1.1 * low;

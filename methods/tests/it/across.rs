@@ -23,7 +23,7 @@ fn wrong_parameters_are_refused_by_name() {
         ("vmas", "lambda=0 lambda=1.5 samples=99 neighbours=1 iterations=0 points=faces"),
         ("vmas", "refit=none contact=1 connect=all"),
         ("tight", "lambda=-1 samples=99 rounds=1001"),
-        ("cover", "mood=sad mood=1 radii=equal"),
+        ("cover", "mood=sad mood=1 radii=same"),
     ] {
         let found = medial_methods::find(method).expect("registered");
         for (key, value) in wrong.split(' ').filter_map(|pair| pair.split_once('=')) {
