@@ -41,7 +41,7 @@ pub struct Arguments {
     /// [default: all but those that run on request].
     #[arg(long, value_name = "ID[:KEY=VALUE]", value_delimiter = ',')]
     methods: Vec<String>,
-    /// Simplify to these sphere counts [default: 500,200,100].
+    /// Simplify to these sphere counts [default: 500,200,100; 200,100,50 without a mesh].
     #[arg(long, value_name = "COUNTS", value_delimiter = ',')]
     spheres: Vec<usize>,
     /// Run method ID at these native levels instead of its default sweep; repeatable.
@@ -231,6 +231,9 @@ struct Pages<'r> {
     due: [Instant; 2],
 }
 
+/// Numbers of spheres on the example shapes, which need few and show all methods within a minute.
+const EXAMPLE_COUNTS: [usize; 3] = [200, 100, 50];
+
 /// The largest number of seeds of a method.
 const MOST_SEEDS: u64 = 1_000;
 
@@ -260,6 +263,9 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
         Some(path) => Study::read(path)?,
         None => Study::default(),
     };
+    if arguments.study.is_none() && arguments.meshes.is_empty() && arguments.dataset.is_empty() {
+        study.spheres = EXAMPLE_COUNTS.to_vec();
+    }
     if !arguments.meshes.is_empty() {
         // Named meshes replace those of the study, and its sets with them.
         study.meshes = arguments.meshes.iter().map(absolute).collect();
