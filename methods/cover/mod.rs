@@ -19,8 +19,8 @@
 //! - `depth(c) + G / 2`, they do both by `G / 2` at most (`mood=balanced`),
 //!
 //! and for these centres no other radii do better, as long as a ball protrudes by its radius less its
-//! depth. All moods minimise `G` over the centres. An inner ball that is contained in another has the larger `f` everywhere, so
-//! centres of medial balls are enough.
+//! depth. All moods minimise `G` over the centres. An inner ball that is contained in another has the larger
+//! `f` everywhere, so centres of medial balls are enough.
 //!
 //! # Steps
 //!
@@ -191,8 +191,7 @@ impl PreparedCover<'_> {
         CoverTest::new(self.shape.mesh(), &self.tree, &self.inside)
     }
 
-    /// The certified interval of `G`, no wider than `width`, or than the least multiple that can be certified: where the
-    /// same gap is on whole curves, as on a torus, a narrow one has too many cubes.
+    /// The certified interval of `G`, no wider than `width`, or than the least multiple that can be certified.
     fn gap(&self, balls: &[Sphere], mut width: f64) -> Result<OneSided> {
         loop {
             match self.test().uncovered(balls, width) {

@@ -21,11 +21,11 @@
 //!    So balls with `r <= -s` need no search, and the others bound the overshoot in the cubes they meet.
 //! 4. Everything else is bounded by distances being 1-Lipschitz. For cones and slabs this is the only
 //!    bound, and `sigma` comes from the tree of [`MedialUnion`] in place of lists.
-//!
-//! 5. Where the surface is about to be uncovered everywhere by the same distance, as on tubes, 4 alone would need cubes as small
-//!    as the tolerance. So a convex function `g >= sigma` bounds it to second order: the signed distance to one ball, or the mean
-//!    of two, with weights that leave no slope along the surface. The largest `g` in the part of a cube in K is at a corner of
-//!    the cube in K or on the surface, and there at a corner of a triangle that is cut to the cube.
+//! 5. On tubes the distance is near its maximum along whole curves, and 4 alone would need cubes as small
+//!    as the tolerance there. So a convex function `g >= sigma` bounds it to second order: the signed
+//!    distance to one ball, or the mean of two with weights that leave no slope along the surface. In the
+//!    part of a cube in K, `g` is largest at a corner of the cube in K, or at a corner of a triangle of the
+//!    surface that is cut to the cube.
 //!
 //! All cubes of one size are evaluated in one round, so the result is the same for any number of
 //! threads.
@@ -262,8 +262,8 @@ impl<'a> CoverTest<'a> {
         Bound { reached, at, upper, place, balls: list.collect() }
     }
 
-    /// A bound on the distance to the nearer of two balls in the part of a cube in the solid, by item 5; infinite if it is
-    /// more than `enough` for sure.
+    /// A bound on the distance to the nearer of two balls in the part of a cube in the solid, by item 5;
+    /// infinite if it exceeds `enough`.
     fn second_order(&self, [a, b]: [Sphere; 2], cube: &Cube, place: Place, enough: f64) -> f64 {
         let (q, half) = (cube.centre, cube.half);
         let (mut cut, mut normal) = (Vec::new(), Vec3::ZERO);
