@@ -174,9 +174,9 @@ fn drawn(
         let judge = judge.transpose().map_err(|error| Failure::at(&arguments.mesh, error))?;
         for (path, axis) in arguments.axes.iter().zip(&read.axes) {
             let mut made = Deviation::new(&read.shape, path, axis, arguments.tolerance)?;
-            let measured = judge.as_ref().map(|judge| judge.evaluate(axis)).transpose();
+            let measured = judge.as_ref().map(|judge| judge.distances(axis)).transpose();
             let measured = measured.map_err(|error| Failure::at(path, error))?;
-            made.hausdorff = measured.map(|evaluation| evaluation.distances.hausdorff);
+            made.hausdorff = measured.map(|distances| distances.hausdorff);
             deviations.push(made);
         }
     }
