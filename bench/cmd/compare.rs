@@ -263,7 +263,9 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
         Some(path) => Study::read(path)?,
         None => Study::default(),
     };
-    if arguments.study.is_none() && arguments.meshes.is_empty() && arguments.dataset.is_empty() {
+    // An edition has the counts of other meshes.
+    let is_example = arguments.meshes.is_empty() && arguments.dataset.is_empty();
+    if arguments.study.is_none() && is_example && arguments.against.is_none() {
         study.spheres = EXAMPLE_COUNTS.to_vec();
     }
     if !arguments.meshes.is_empty() {

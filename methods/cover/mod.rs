@@ -297,9 +297,13 @@ impl PreparedCover<'_> {
         loop {
             let balls = grown(inner, gap.upper + margin);
             let uncovered = self.gap(&balls, PROOF_WIDTH)?;
-            // With a margin of the solid's size there is nothing to prove.
-            if uncovered.upper == 0.0 || margin > 1.0 {
+            if uncovered.upper == 0.0 {
                 return Ok(gap.upper + margin);
+            }
+            if margin > 1.0 {
+                let why =
+                    "no proof that the spheres contain the solid, even with its diagonal as margin";
+                return Err(SimplifyError::Failed(why.to_owned()));
             }
             self.run.step(0, 1)?;
             margin *= BEYOND_FACTOR;

@@ -157,6 +157,23 @@ impl<'a> CoverTest<'a> {
         ])
     }
 
+    /// Where a cube is, and a point of the solid near its centre with its value, `here` at the centre; `None` outside.
+    fn place_of(
+        &self,
+        cube: &Cube,
+        here: f64,
+        value: impl Fn(Vec3) -> f64,
+    ) -> Option<(Place, f64, Vec3)> {
+        let q = cube.centre;
+        let Place::Near(face) = cube.place else { return Some((Place::Inside, here, q)) };
+        let Closest { distance, face, point, .. } = self.tree.closest_from(q, face);
+        if distance <= cube.reach() + ROUNDING {
+            // Unlike the centre, the closest point of the surface is in the solid for sure.
+            return Some((Place::Near(Some(face)), value(point), point));
+        }
+        (self.inside.side(q) != Side::Outside).then_some((Place::Inside, here, q))
+    }
+
     fn uncovered_by(&self, union: &MedialUnion, cube: &Cube, enough: f64) -> Bound {
         let (q, reach) = (cube.centre, cube.reach());
         let sigma = union.signed(q);
@@ -164,18 +181,10 @@ impl<'a> CoverTest<'a> {
         if upper <= enough {
             return Bound::closed(upper);
         }
-        let (mut place, mut reached, mut at) = (cube.place, sigma, q);
-        if let Place::Near(face) = place {
-            let closest = self.tree.closest_from(q, face);
-            if closest.distance <= reach + ROUNDING {
-                place = Place::Near(Some(closest.face));
-                (reached, at) = (union.signed(closest.point), closest.point);
-            } else if self.inside.side(q) == Side::Outside {
-                return Bound::closed(f64::NEG_INFINITY);
-            } else {
-                place = Place::Inside;
-            }
-        }
+        let value = |p| union.signed(p);
+        let Some((place, reached, at)) = self.place_of(cube, sigma, value) else {
+            return Bound::closed(f64::NEG_INFINITY);
+        };
         Bound { reached, at, upper, place, balls: Vec::new() }
     }
 
@@ -233,23 +242,14 @@ impl<'a> CoverTest<'a> {
         if upper <= enough {
             return Bound::closed(upper);
         }
-        let (mut place, mut reached, mut at) = (cube.place, signed, q);
-        if let Place::Near(face) = place {
-            let closest = self.tree.closest_from(q, face);
-            if closest.distance <= reach + ROUNDING {
-                place = Place::Near(Some(closest.face));
-                // The closest point of the surface is in the solid, and the list of balls holds around it.
-                let least = |least: f64, &i: &u32| {
-                    least.min(balls[i as usize].signed_distance(closest.point))
-                };
-                at = closest.point;
-                reached = cube.balls.iter().fold(f64::INFINITY, least);
-            } else if self.inside.side(q) == Side::Outside {
-                return Bound::closed(f64::NEG_INFINITY);
-            } else {
-                place = Place::Inside;
-            }
-        }
+        // The list of balls holds around the closest point, too.
+        let value = |p| {
+            let each = cube.balls.iter().map(|&i| balls[i as usize].signed_distance(p));
+            each.fold(f64::INFINITY, f64::min)
+        };
+        let Some((place, reached, at)) = self.place_of(cube, signed, value) else {
+            return Bound::closed(f64::NEG_INFINITY);
+        };
         let two = near.map(|(_, i)| balls[i as usize]);
         if reached <= enough {
             upper = upper.min(self.second_order(two, cube, place, enough));
