@@ -109,13 +109,14 @@ pub(super) struct Depth {
     pub gradient: Vec3,
 }
 
-/// The known depth of a point: the depth and the closest face, or a lower bound of the depth and
-/// a face near to it.
+/// The known depth of a point and the closest face, or a lower bound of the depth and a face near to it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Known {
     point: Vec3,
     depth: f64,
     face: u32,
+    /// With its gradient, unless a bound.
+    exact: Option<Depth>,
 }
 
 /// The solid, as the residuals see it.
@@ -221,6 +222,10 @@ impl Goal {
             if known.depth - moved >= enough {
                 return None;
             }
+            // A ball whose spheres stayed.
+            if let Some(depth) = known.exact.filter(|_| moved == 0.0) {
+                return Some(depth);
+            }
             if known.depth.abs() > moved {
                 side = Some(if known.depth > 0.0 { Side::Inside } else { Side::Outside });
             }
@@ -233,13 +238,14 @@ impl Goal {
             Side::Inside if beyond > 0.0 => self.tree.closest_within_from(p, beyond, face),
             _ => Some(self.tree.closest_from(p, face)),
         };
-        let Some(closest) = closest else {
-            *known = Some(Known { point: p, depth: beyond, face: face.unwrap_or(0) });
-            return None;
-        };
-        let depth = self.signed(p, &closest, side);
-        *known = Some(Known { point: p, depth: depth.value, face: closest.face });
-        (depth.value < enough).then_some(depth)
+        let exact = closest.map(|closest| self.signed(p, &closest, side));
+        *known = Some(Known {
+            point: p,
+            depth: exact.map_or(beyond, |exact| exact.value),
+            face: closest.map_or(face.unwrap_or(0), |closest| closest.face),
+            exact,
+        });
+        exact.filter(|exact| exact.value < enough)
     }
 
     /// A point next to the surface for each centre that is outside of the solid, the closest but for rounding.
