@@ -60,7 +60,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FRACTION", value_parser = fraction)]
     max_error: Option<f64>,
     /// Limit the distance of a reconstruction to the boundary of the union, as a fraction of the diagonal.
-    #[arg(long, value_name = "FRACTION", default_value_t = 0.01, value_parser = fraction)]
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.02, value_parser = fraction)]
     tolerance: f64,
     #[command(flatten)]
     fitting: AxisOptions,

@@ -156,7 +156,7 @@ pub fn union_surface_while(
         most,
         |points: &[Vec3]| {
             let found = union.deepest_ball_batch(points).into_iter();
-            found.map(|(signed, radius)| Value { signed, radius }).collect()
+            found.map(|(signed, radius, place)| Value { signed, radius, place }).collect()
         },
         |leaf: &Leaf, values: [Value; 4]| {
             let size = sizes[usize::from(leaf.generation)];
@@ -208,7 +208,7 @@ fn cube_around(union: &MedialUnion, longest: f64) -> Bisection {
 // cells*, IEICE Transactions E74 (1991).
 //
 // 1. Each edge of the tetrahedra with ends on different sides has one vertex of the surface, where
-//    the signed distance is zero, found by the Illinois variant of regula falsi.
+//    the signed distance is zero, found by the Illinois variant of regula falsi, for one primitive first.
 // 2. In a tetrahedron with one or three vertices inside, the three vertices on its edges are a
 //    triangle; with two inside, the four are cut into two triangles along the shorter diagonal.
 //
@@ -228,6 +228,9 @@ const VERTEX_TOLERANCE: f64 = 1e-9;
 
 /// Evaluations on one edge: halving alone would reach the resolution of doubles.
 const MAX_STEPS: usize = 60;
+
+/// Steps on one edge that may look at one primitive alone.
+const STEPS_ALONE: usize = 8;
 
 /// The surface, and for each of its vertices the length of the edge that it is on.
 fn march(grid: &Bisection, union: &MedialUnion) -> (TriMesh, Vec<f64>) {
@@ -254,15 +257,13 @@ fn march(grid: &Bisection, union: &MedialUnion) -> (TriMesh, Vec<f64>) {
     edges.dedup();
     let chunks = edges.par_iter().with_min_len(1 << 8);
     let found: Vec<(Vec3, f64)> = chunks
-        .map_init(
-            || 0,
-            |near: &mut usize, &key: &u64| {
-                let ends = [(key >> 32) as u32, key as u32];
-                let [a, b] = ends.map(|v| grid.position(v));
-                let values = ends.map(|v| grid.values[v as usize].signed);
-                (crossing(union, near, [a, b], values), a.distance(b))
-            },
-        )
+        .map(|&key| {
+            let ends = [(key >> 32) as u32, key as u32];
+            let [a, b] = ends.map(|v| grid.position(v));
+            let [at_a, at_b] = ends.map(|v| grid.values[v as usize]);
+            let near = at_a.place as usize;
+            (crossing(union, near, [a, b], [at_a.signed, at_b.signed]), a.distance(b))
+        })
         .collect();
     let vertices: Vec<Vec3> = found.iter().map(|f| f.0).collect();
     let faces = mixed
@@ -326,7 +327,7 @@ fn cut(ring: &[u32], vertices: &[Vec3]) -> Vec<[u32; 3]> {
 /// for values of different sides at its ends.
 fn crossing(
     union: &MedialUnion,
-    near: &mut usize,
+    mut near: usize,
     [a, b]: [Vec3; 2],
     [at_a, at_b]: [f64; 2],
 ) -> Vec3 {
@@ -334,16 +335,19 @@ fn crossing(
     let (mut low, mut high) = (at_a, at_b);
     let enough = VERTEX_TOLERANCE * a.distance(b);
     let mut best = if at_a.abs() < at_b.abs() { (at_a.abs(), 0.0) } else { (at_b.abs(), 1.0) };
-    for _ in 0..MAX_STEPS {
+    for step in 0..MAX_STEPS {
         if best.0 <= enough || t - s <= f64::EPSILON {
             break;
         }
-        // Illinois: the value of the end that stays is halved, so that both ends converge.
-        let u = (s + (t - s) * (low / (low - high))).clamp(s, t);
-        let value = union.signed_from(a.lerp(b, u), near);
+        // Where the primitive that was nearest last is crossed, mostly the union is: one search then.
+        let alone = |u| union.signed_at_place(a.lerp(b, u), near);
+        let u = (step < STEPS_ALONE).then(|| root(alone, [s, t], enough)).flatten();
+        let u = u.unwrap_or_else(|| secant([s, t], [low, high]));
+        let value = union.signed_from(a.lerp(b, u), &mut near);
         if value.abs() < best.0 {
             best = (value.abs(), u);
         }
+        // Illinois: the value of the end that stays is halved, so that both ends converge.
         if (value < 0.0) == (at_a < 0.0) {
             (s, low, high) = (u, value, 0.5 * high);
         } else {
@@ -351,6 +355,32 @@ fn crossing(
         }
     }
     a.lerp(b, best.1)
+}
+
+/// A place between two at which a function of different signs there is zero, up to `enough`.
+fn root(f: impl Fn(f64) -> f64, [mut s, mut t]: [f64; 2], enough: f64) -> Option<f64> {
+    let (mut low, mut high) = (f(s), f(t));
+    let is_low = low < 0.0;
+    if is_low == (high < 0.0) || !(low.is_finite() && high.is_finite()) {
+        return None;
+    }
+    for _ in 0..MAX_STEPS {
+        let u = secant([s, t], [low, high]);
+        let value = f(u);
+        if value.abs() <= enough {
+            return Some(u);
+        }
+        if (value < 0.0) == is_low {
+            (s, low, high) = (u, value, 0.5 * high);
+        } else {
+            (t, high, low) = (u, value, 0.5 * low);
+        }
+    }
+    None
+}
+
+fn secant([s, t]: [f64; 2], [low, high]: [f64; 2]) -> f64 {
+    (s + (t - s) * (low / (low - high))).clamp(s, t)
 }
 
 // Tetrahedra that fill a cube and are refined by bisection, conforming, with a value at each vertex.
@@ -379,6 +409,8 @@ struct Value {
     pub signed: f64,
     /// Radius of the ball of the union that attains it.
     pub radius: f64,
+    /// Place of the primitive that attains it.
+    pub place: u32,
 }
 
 /// A tetrahedron of the current subdivision.
@@ -596,7 +628,10 @@ mod tests {
     fn refined(target: Vec3, smallest: f64) -> Bisection {
         let mut all = Bisection::of_cube(Vec3::ZERO, 1.0);
         let values = |points: &[Vec3]| {
-            points.iter().map(|p| Value { signed: p.distance(target), radius: 1.0 }).collect()
+            points
+                .iter()
+                .map(|p| Value { signed: p.distance(target), radius: 1.0, place: 0 })
+                .collect()
         };
         let sizes: Vec<f64> = (0..=MAX_BISECTIONS).map(|g| all.longest_edge(g)).collect();
         let wanted = |leaf: &Leaf, values: [Value; 4]| {

@@ -191,6 +191,11 @@ impl MedialUnion {
         nearest.signed
     }
 
+    /// The signed distance to the primitive at a place alone; infinite where the cones of a slab's sides decide.
+    pub(crate) fn signed_at_place(&self, p: Vec3, place: usize) -> f64 {
+        self.parts.shape(place).signed(p)
+    }
+
     /// The primitive of least signed distance, searched as in [`signed_from`](Self::signed_from), and the
     /// centre of its interpolated sphere that attains the distance.
     pub(crate) fn deepest_from(
@@ -313,12 +318,12 @@ impl MedialUnion {
     }
 
     /// For many points, in their order, in parallel: [`signed`](Self::signed), and the radius of the
-    /// ball on the primitive that attains it.
-    pub fn deepest_ball_batch(&self, points: &[Vec3]) -> Vec<(f64, f64)> {
+    /// ball on the primitive that attains it, with the place of that primitive.
+    pub(crate) fn deepest_ball_batch(&self, points: &[Vec3]) -> Vec<(f64, f64, u32)> {
         in_morton_order(points, |last: &mut usize, p| {
             let (nearest, place) = self.parts.nearest::<Signed>(p, *last);
             *last = place;
-            (nearest.signed, self.parts.shape(place).radius_towards(p))
+            (nearest.signed, self.parts.shape(place).radius_towards(p), place as u32)
         })
     }
 
