@@ -41,7 +41,7 @@ pub struct Arguments {
     /// [default: all but those that run on request].
     #[arg(long, value_name = "ID[:KEY=VALUE]", value_delimiter = ',')]
     methods: Vec<String>,
-    /// Simplify to these sphere counts [default: 500,200,100; 200,100,50 without a mesh].
+    /// Simplify to these sphere counts [default: 500,200,100; 100,50 without a mesh].
     #[arg(long, value_name = "COUNTS", value_delimiter = ',')]
     spheres: Vec<usize>,
     /// Run method ID at these native levels instead of its default sweep; repeatable.
@@ -232,7 +232,7 @@ struct Pages<'r> {
 }
 
 /// Numbers of spheres on the example shapes, which need few and show all methods within a minute.
-const EXAMPLE_COUNTS: [usize; 3] = [200, 100, 50];
+const EXAMPLE_COUNTS: [usize; 2] = [100, 50];
 
 /// The largest number of seeds of a method.
 const MOST_SEEDS: u64 = 1_000;

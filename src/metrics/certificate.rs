@@ -522,7 +522,9 @@ impl Side for UnionSide<'_> {
         if lipschitz <= enough && closest.distance <= known {
             return Bound { reached: 0.0, centre, upper: lipschitz };
         }
-        let deepest = self.union.deepest(centre);
+        // Any primitive that buries the piece will do.
+        let buried = -(EXPOSED + reach) * (1.0 + 1e-9);
+        let deepest = self.union.deepest_or(centre, &mut 0, buried);
         // The Lipschitz bound first: it costs nothing.
         if deepest.signed < -EXPOSED
             && (deepest.signed + reach < -EXPOSED

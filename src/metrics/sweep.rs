@@ -72,10 +72,17 @@ trait Swept: Sync {
     type Piece: Clone + Send + Sync;
 
     /// Bounds a piece: `None` if it does not exceed `enough`.
-    fn bound(&self, piece: &mut Self::Piece, enough: f64, near: &mut usize) -> Option<Bound>;
+    fn bound(&self, piece: &mut Self::Piece, enough: f64, near: &mut Near) -> Option<Bound>;
 
     /// Appends pieces that together cover a piece.
     fn divide(&self, piece: &Self::Piece, parts: &mut Vec<Self::Piece>);
+}
+
+/// Where the searches for the piece before ended: most pieces are next to it.
+#[derive(Default)]
+struct Near {
+    place: usize,
+    face: Option<u32>,
 }
 
 /// A piece that may exceed the largest distance.
@@ -104,7 +111,7 @@ fn peaks_above<S: Swept>(
         left = left.saturating_sub(pieces.len());
         let limit = enough(largest);
         let bounds = pieces.par_chunks_mut(RUN).flat_map_iter(|run| {
-            let mut near = 0;
+            let mut near = Near::default();
             let bounds = run.iter_mut().map(|piece| side.bound(piece, limit, &mut near));
             bounds.collect::<Vec<_>>()
         });
@@ -143,9 +150,9 @@ struct SweptSurface<'a> {
 impl Swept for SweptSurface<'_> {
     type Piece = [Vec3; 3];
 
-    fn bound(&self, corners: &mut [Vec3; 3], enough: f64, near: &mut usize) -> Option<Bound> {
+    fn bound(&self, corners: &mut [Vec3; 3], enough: f64, near: &mut Near) -> Option<Bound> {
         let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let (deepest, attained_at) = self.union.deepest_from(centre, near);
+        let (deepest, attained_at) = self.union.deepest_from(centre, &mut near.place);
         let reached = deepest.signed.abs();
         if reached + farthest(centre, corners) <= enough {
             return None;
@@ -273,7 +280,7 @@ impl Other {
 impl Swept for SweptUnion<'_> {
     type Piece = Hinted;
 
-    fn bound(&self, (piece, hint): &mut Hinted, enough: f64, near: &mut usize) -> Option<Bound> {
+    fn bound(&self, (piece, hint): &mut Hinted, enough: f64, near: &mut Near) -> Option<Bound> {
         let (normals, count) = self.side.normals(piece);
         if self.is_overtopped(piece, &normals[..count]) {
             return None;
@@ -299,7 +306,9 @@ impl Swept for SweptUnion<'_> {
         {
             return None;
         }
-        let closest = self.side.bvh.closest_from(centre, hint.map(|(face, _)| face));
+        let closest =
+            self.side.bvh.closest_from(centre, hint.map_or(near.face, |(face, _)| Some(face)));
+        near.face = Some(closest.face);
         let distance = closest.distance;
         let away = (centre - closest.point).try_normalize().unwrap_or_default();
         let upper = (distance + reach).min(from_face(closest.face));
@@ -307,7 +316,9 @@ impl Swept for SweptUnion<'_> {
         if upper <= enough {
             return None;
         }
-        let (deepest, _) = self.union.deepest_from(centre, near);
+        // Any primitive that buries the piece will do.
+        let buried = -(EXPOSED + reach) * (1.0 + 1e-9);
+        let deepest = self.union.deepest_or(centre, &mut near.place, buried);
         let signed = deepest.signed;
         if signed < -EXPOSED && (signed + reach < -EXPOSED || is_buried_in(deepest.primitive)) {
             return None;

@@ -196,6 +196,14 @@ impl MedialUnion {
         self.parts.shape(place).signed(p)
     }
 
+    /// The primitive of least signed distance, searched as in [`signed_from`](Self::signed_from), or any whose
+    /// distance is at most `enough`.
+    pub(crate) fn deepest_or(&self, p: Vec3, near: &mut usize, enough: f64) -> NearestPrimitive {
+        let (nearest, place) = self.parts.nearest_or::<Signed>(p, *near, enough);
+        *near = place;
+        nearest
+    }
+
     /// The primitive of least signed distance, searched as in [`signed_from`](Self::signed_from), and the
     /// centre of its interpolated sphere that attains the distance.
     pub(crate) fn deepest_from(
