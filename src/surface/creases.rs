@@ -57,31 +57,36 @@ pub fn smooth_normals<'a>(
     flat: &'a [Vec3],
     smooth: f64,
 ) -> impl Fn(usize) -> [Vec3; 3] + Sync + 'a {
-    // The faces around each vertex, and which of their corners it is.
-    let mut around: Vec<Vec<(usize, usize)>> = vec![vec![]; mesh.vertices.len()];
-    for (face, corners) in mesh.faces.iter().enumerate() {
-        for (corner, &vertex) in corners.iter().enumerate() {
-            around[vertex as usize].push((face, corner));
+    // The faces around each vertex with their weighted normals, those of a vertex from its start on.
+    let mut starts = vec![0; mesh.vertices.len() + 1];
+    mesh.faces.iter().flatten().for_each(|&vertex| starts[vertex as usize + 1] += 1);
+    for vertex in 0..mesh.vertices.len() {
+        starts[vertex + 1] += starts[vertex];
+    }
+    let mut next = starts.clone();
+    let mut around = vec![(0, Vec3::ZERO); 3 * mesh.faces.len()];
+    for (face, &corners) in mesh.faces.iter().enumerate() {
+        let points = mesh.triangle(face);
+        for (corner, vertex) in corners.into_iter().enumerate() {
+            let [a, b, c] = [0, 1, 2].map(|k| points[(corner + k) % 3]);
+            let (u, v) = (b - a, c - a);
+            let lengths = u.length() * v.length();
+            let sine = u.cross(v).length() / lengths;
+            // Zero lengths: a face without area has no weight.
+            let normal = if sine.is_finite() { sine / lengths * flat[face] } else { Vec3::ZERO };
+            let place = &mut next[vertex as usize];
+            around[*place] = (face, normal);
+            *place += 1;
         }
     }
     let corner = move |face: usize, vertex: u32| {
-        let around = &around[vertex as usize];
+        let vertex = vertex as usize;
+        let around = &around[starts[vertex]..starts[vertex + 1]];
         if around.len() > MOST_AROUND {
             return flat[face];
         }
         let alike = around.iter().filter(|(other, _)| flat[face].dot(flat[*other]) > smooth);
-        let sum: Vec3 = alike
-            .map(|&(face, corner)| {
-                let points = mesh.triangle(face);
-                let [a, b, c] = [0, 1, 2].map(|k| points[(corner + k) % 3]);
-                let (u, v) = (b - a, c - a);
-                let lengths = u.length() * v.length();
-                let sine = u.cross(v).length() / lengths;
-                // Zero lengths: a face without area has no weight.
-                if sine.is_finite() { sine / lengths * flat[face] } else { Vec3::ZERO }
-            })
-            .sum();
-        sum.normalize_or(flat[face])
+        alike.map(|&(_, normal)| normal).sum::<Vec3>().normalize_or(flat[face])
     };
     move |face| mesh.faces[face].map(|vertex| corner(face, vertex))
 }
