@@ -29,7 +29,7 @@ pub type Result<T, E = SimplifyError> = std::result::Result<T, E>;
 /// A method on one shape, ready for levels.
 type Prepared<'s> = Result<Box<dyn Simplification + 's>>;
 
-/// All methods, in the order of the tables. `vmas` and `cover` are marked to run only when named.
+/// All methods, in the order of the tables. `vmas`, `cover` and `sat-pairwise` are marked to run only when named.
 pub fn registry() -> Vec<Registered> {
     let methods = vec![
         Registered::from(angle::method())
@@ -82,7 +82,8 @@ pub fn registry() -> Vec<Registered> {
             .sweep(&[1.1, 1.25, 1.5, 2.0]),
         Registered::from(sat_pairwise::method())
             .filter(Level::Native(1.1))
-            .sweep(&[1.1, 1.25, 1.5, 2.0]),
+            .sweep(&[1.1, 1.25, 1.5, 2.0])
+            .on_request(),
         Registered::from(tam_heidrich::method())
             .best_for(
                 "Removing whole features of little volume, while loops stay; it does not reach \
@@ -267,8 +268,8 @@ mod tests {
     fn default_sweeps_go_from_fine_to_coarse_wherever_there_is_a_native_level() {
         for Registered { method, presentation, .. } in registry() {
             let (info, sweep) = (method.info(), presentation.sweep);
-            // A native level of `tight` is an error bound, costs several runs, and comes before the counts.
-            let runs_sweep = !presentation.on_request && info.id != "tight";
+            // Native levels of these are error bounds and cost several runs each.
+            let runs_sweep = info.id != "tight" && info.id != "cover";
             let Some(native) = info.native.as_ref().filter(|_| runs_sweep) else {
                 assert!(sweep.is_empty(), "{}: a sweep that no comparison runs", info.id);
                 continue;
