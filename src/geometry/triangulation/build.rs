@@ -59,10 +59,13 @@ pub(super) struct Builder<'s, M> {
     pub(super) free: Vec<u32>,
     pub(super) last: u32,
     pub(super) zone: Vec<u32>,
-    pub(super) walls: Vec<Wall>,
+    walls: Vec<Wall>,
     front: Vec<Candidate>,
-    pub(super) local: Vec<u8>,
-    rim: [u32; TABLE + 1],
+    /// For each vertex a tag of the last conflict zone that it was on the boundary of, a multiple of
+    /// [`TABLE`], plus its number there.
+    local: Vec<u32>,
+    /// The tag of the last conflict zone.
+    tag: u32,
     pub(super) table: Box<[Face; TABLE * TABLE]>,
     pub(super) edges: Vec<(u64, Face)>,
     metric: std::marker::PhantomData<fn() -> M>,
@@ -108,8 +111,8 @@ impl<'s, M: Metric> Builder<'s, M> {
             zone: Vec::new(),
             walls: Vec::new(),
             front: Vec::new(),
-            local: vec![ABSENT; sites.len()],
-            rim: [0; TABLE + 1],
+            local: vec![0; sites.len()],
+            tag: 0,
             table: Box::new([Face::NONE; TABLE * TABLE]),
             edges: Vec::new(),
             metric: std::marker::PhantomData,
@@ -198,8 +201,8 @@ impl<'s, M: Metric> Builder<'s, M> {
         if !self.find_conflict_zone(vertex, seed) {
             return Ok(Outcome::Straddling);
         }
-        self.collect_walls();
-        self.stellate(vertex)?;
+        let walls = self.collect_walls();
+        self.stellate(vertex, walls)?;
         Ok(Outcome::Done)
     }
 
@@ -317,11 +320,9 @@ const FOREIGN: u8 = 5;
 /// A facet of the boundary of the conflict zone: its vertices, counter-clockwise from outside, and
 /// the facet as a face of the cell outside.
 #[derive(Clone, Copy)]
-pub(super) struct Wall {
-    pub(super) v: [u32; 3],
-    pub(super) outside: Face,
-    /// The vertices' numbers among the vertices of all walls.
-    pub(super) local: [u8; 3],
+struct Wall {
+    v: [u32; 3],
+    outside: Face,
 }
 
 /// A cell beside the conflict zone, with the determinant that decides whether it joins the zone
@@ -388,6 +389,7 @@ impl<M: Metric> Builder<'_, M> {
         if front.len() < room {
             front.resize(room, Candidate { cell: 0, det: 0.0, bound: 0.0 });
         }
+        let (cells, state, front) = (&cells[..], &mut state[..], &mut front[..]);
         let (mut count, mut met) = (0, UNKNOWN);
         for &c in &zone[generation..] {
             for n in cells[c as usize].n {
@@ -405,6 +407,7 @@ impl<M: Metric> Builder<'_, M> {
     /// Tests the first `count` candidates and appends those in conflict to the zone.
     fn test_front(&mut self, vertex: u32, count: usize) {
         let Self { cells, sites, state, zone, front, filter, .. } = self;
+        let (cells, sites, state) = (&cells[..], *sites, &mut state[..]);
         let site = &sites[vertex as usize];
         let front = &mut front[..count];
         // Two determinants at a time fill the lanes of the vector unit.
@@ -420,7 +423,6 @@ impl<M: Metric> Builder<'_, M> {
         }
         // Branch-free append, as in `collect_front`.
         let mut size = zone.len();
-        zone.resize(size + count, 0);
         for &candidate in front.iter() {
             let Candidate { cell, det, bound } = candidate;
             // The usual case inline; the call is for doubtful signs and infinite cells.
@@ -430,32 +432,35 @@ impl<M: Metric> Builder<'_, M> {
             } else {
                 conflicts_given::<M>(*filter, cells, sites, site, candidate)
             };
-            zone[size] = cell;
+            zone.push(cell);
             size += usize::from(conflict);
+            zone.truncate(size);
             state[cell as usize] |= u8::from(conflict) * CONFLICT;
         }
-        zone.truncate(size);
     }
 
-    /// Lists the facets between the conflict zone and the cells around it.
-    fn collect_walls(&mut self) {
+    /// Lists the facets between the conflict zone and the cells around it; returns their number.
+    fn collect_walls(&mut self) -> usize {
         let Self { cells, state, zone, walls, .. } = self;
         let room = 4 * zone.len();
-        walls.clear();
-        walls.resize(room, Wall { v: [0; 3], outside: Face::NONE, local: [ABSENT; 3] });
+        if walls.len() < room {
+            walls.resize(room, Wall { v: [0; 3], outside: Face::NONE });
+        }
+        let (cells, state, walls) = (&cells[..], &state[..], &mut walls[..]);
         let mut count = 0;
         for &c in zone.iter() {
-            let cell = &cells[c as usize];
+            let Cell { v, n } = cells[c as usize];
+            let next: &mut [Wall; 4] = walls[count..].first_chunk_mut().expect("there is room");
+            let mut found = 0;
             for i in 0..4 {
-                let outside = cell.n[i];
-                let [a, b, c] = OPPOSITE[i];
-                walls[count] =
-                    Wall { v: [cell.v[a], cell.v[b], cell.v[c]], outside, local: [ABSENT; 3] };
+                let f = OPPOSITE[i];
+                next[found] = Wall { v: [v[f[0]], v[f[1]], v[f[2]]], outside: n[i] };
                 // Tested and not in conflict: outside. Branch-free, as in `collect_front`.
-                count += usize::from(state[outside.cell() as usize] == TESTED);
+                found += usize::from(state[n[i].cell() as usize] == TESTED);
             }
+            count += found;
         }
-        walls.truncate(count);
+        count
     }
 }
 
@@ -504,113 +509,115 @@ fn conflicts_given<M: Metric>(
 
 // Step 4: the conflict zone is replaced by a cone.
 
-/// Local number of a vertex that is not on the boundary of the conflict zone.
-const ABSENT: u8 = u8::MAX;
-
 /// Boundaries of up to this many vertices are linked through a square table.
 const TABLE: usize = 64;
 
+/// The entry of an edge, by the numbers of its ends.
+#[inline(always)]
+fn at(a: u32, b: u32) -> usize {
+    a as usize % TABLE * TABLE + b as usize % TABLE
+}
+
 impl<M: Metric> Builder<'_, M> {
-    /// Replaces the conflict zone by the cone of its walls from the site.
-    fn stellate(&mut self, vertex: u32) -> Result<(), TriangulationError> {
-        self.allocate()?;
-        let Self { cells, state, zone, walls, .. } = self;
-        for (wall, &id) in walls.iter_mut().zip(zone.iter()) {
-            // The vertex at infinity goes last; a rotation keeps the orientation.
-            if wall.v[0] == INFINITE {
-                wall.v.rotate_left(1);
-            } else if wall.v[1] == INFINITE {
+    /// Replaces the conflict zone by the cone of its walls, `count` of them, from the site.
+    fn stellate(&mut self, vertex: u32, count: usize) -> Result<(), TriangulationError> {
+        self.allocate(count)?;
+        for wall in &mut self.walls[..count] {
+            // The vertex at infinity goes last; a rotation keeps the orientation. It is never first,
+            // since it is the last of its cell, see [`OPPOSITE`].
+            if wall.v[1] == INFINITE {
                 wall.v.rotate_right(1);
             }
-            let [a, b, c] = wall.v;
-            let outside = wall.outside;
-            cells[id as usize] = Cell { v: [vertex, a, b, c], n: [outside; 4] };
+        }
+        // The walls are a triangulated sphere: by Euler's relation it has two more vertices than
+        // half its triangles.
+        let small = count / 2 + 2 <= TABLE;
+        if small {
+            self.tabulate_edges(count);
+        }
+        let Self { cells, state, zone, walls, local, table, .. } = self;
+        let (cells, state, local) = (&mut cells[..], &mut state[..], &local[..]);
+        for (&Wall { v: [a, b, c], outside }, &id) in walls[..count].iter().zip(zone.iter()) {
+            let mut n = [outside; 4];
+            if small {
+                let [i, j, k] = [local[a as usize], local[b as usize], local[c as usize]];
+                n = [outside, table[at(k, j)], table[at(i, k)], table[at(j, i)]];
+            }
+            cells[id as usize] = Cell { v: [vertex, a, b, c], n };
             state[id as usize] = UNKNOWN;
             cells[outside.cell() as usize].n[outside.index()] = Face::new(id, 0);
             // Each tested cell outside the zone is behind a wall, so this resets all their marks.
             state[outside.cell() as usize] = UNKNOWN;
         }
         // The next site is close on the curve, so the walk to it starts at a new cell.
-        self.last = self.zone[self.walls.len() - 1];
-        for &id in &self.zone[self.walls.len()..] {
-            self.cells[id as usize].v[0] = UNUSED;
-            self.state[id as usize] = UNKNOWN;
+        self.last = zone[count - 1];
+        for &id in &zone[count..] {
+            cells[id as usize].v[0] = UNUSED;
+            state[id as usize] = UNKNOWN;
             self.free.push(id);
         }
-        // The walls are a triangulated sphere: by Euler's relation it has two more vertices than
-        // half its triangles.
-        if self.walls.len() / 2 + 2 <= TABLE {
-            self.link_by_table();
-        } else {
-            self.link_by_hashing();
+        if !small {
+            self.link_by_hashing(count);
         }
         Ok(())
     }
 
     /// Extends the zone by records until there is one for each wall.
-    fn allocate(&mut self) -> Result<(), TriangulationError> {
-        while self.zone.len() < self.walls.len() {
-            let id = if let Some(id) = self.free.pop() {
-                id
-            } else if self.cells.len() < MAX_CELLS {
-                self.state.push(UNKNOWN);
-                self.cells.push(Cell { v: [UNUSED; 4], n: [Face::NONE; 4] });
-                self.cells.len() as u32 - 1
-            } else {
-                let points = self.sites.len() - 1;
-                return Err(TriangulationError::TooLarge { points, limit: MAX_CELLS });
-            };
-            self.zone.push(id);
+    fn allocate(&mut self, walls: usize) -> Result<(), TriangulationError> {
+        let missing = walls.saturating_sub(self.zone.len());
+        let reused = missing.min(self.free.len());
+        self.zone.extend(self.free.drain(self.free.len() - reused..).rev());
+        let (start, end) = (self.cells.len(), self.cells.len() + missing - reused);
+        if end > MAX_CELLS {
+            let points = self.sites.len() - 1;
+            return Err(TriangulationError::TooLarge { points, limit: MAX_CELLS });
         }
+        self.zone.extend(start as u32..end as u32);
+        self.cells.resize(end, Cell { v: [UNUSED; 4], n: [Face::NONE; 4] });
+        self.state.resize(end, UNKNOWN);
         Ok(())
     }
 
-    /// Links new cells with each other: two share a facet where their walls share an edge, and
-    /// each directed edge belongs to one wall.
+    /// Numbers the vertices of the walls, and notes for each directed edge, by the numbers of its
+    /// ends, the facet of the new cell behind it.
     ///
-    /// The vertices of the walls are numbered, and a table indexed by pairs of numbers is filled,
-    /// then read. It need not be cleared: the walls form a closed surface, so every edge that is
-    /// read was written just before.
-    fn link_by_table(&mut self) {
-        let Self { walls, local, rim, table, cells, zone, .. } = self;
-        // Numbers are below TABLE, so the remainder changes nothing; it spares the bounds check.
-        let at = |a: u8, b: u8| (usize::from(a) * TABLE + usize::from(b)) % (TABLE * TABLE);
-        let mut count = 0;
-        for (wall, &id) in walls.iter_mut().zip(zone.iter()) {
-            for (v, number) in wall.v.into_iter().zip(&mut wall.local) {
+    /// Two new cells share a facet where their walls share an edge, and each directed edge belongs to
+    /// one wall. The table need not be cleared: the walls form a closed surface, so every edge that
+    /// is read was written just before.
+    fn tabulate_edges(&mut self, count: usize) {
+        let Self { walls, local, table, zone, tag, .. } = self;
+        *tag = tag.wrapping_add(TABLE as u32);
+        if *tag == 0 {
+            // All tags have been in use.
+            local.fill(0);
+            *tag = TABLE as u32;
+        }
+        let (local, tag) = (&mut local[..], *tag);
+        let mut next = tag;
+        for (wall, &id) in walls[..count].iter().zip(zone.iter()) {
+            let mut numbers = [0; 3];
+            for (v, number) in wall.v.into_iter().zip(&mut numbers) {
                 let known = &mut local[v as usize];
-                let fresh = *known == ABSENT;
-                *known = if fresh { count as u8 } else { *known };
-                *number = *known;
-                // Branch-free: a vertex that is not fresh is overwritten by the next one.
-                rim[count] = v;
-                count += usize::from(fresh);
+                let fresh = *known < tag;
+                *number = if fresh { next } else { *known };
+                *known = *number;
+                next += u32::from(fresh);
             }
-            let [a, b, c] = wall.local;
+            let [a, b, c] = numbers;
             table[at(b, c)] = Face::new(id, 1);
             table[at(c, a)] = Face::new(id, 2);
             table[at(a, b)] = Face::new(id, 3);
         }
-        for (wall, &id) in walls.iter().zip(zone.iter()) {
-            let [a, b, c] = wall.local;
-            let n = &mut cells[id as usize].n;
-            n[1] = table[at(c, b)];
-            n[2] = table[at(a, c)];
-            n[3] = table[at(b, a)];
-        }
-        for &v in &rim[..count] {
-            local[v as usize] = ABSENT;
-        }
     }
 
-    /// The same for large conflict zones, through a hash table of undirected edges.
-    fn link_by_hashing(&mut self) {
+    /// Links the new cells of a large conflict zone through a hash table of undirected edges.
+    fn link_by_hashing(&mut self, count: usize) {
         let Self { walls, edges, cells, zone, .. } = self;
         // At most half full: there are three edges for every two walls.
-        let size = (3 * walls.len()).next_power_of_two();
+        let size = (3 * count).next_power_of_two();
         edges.clear();
         edges.resize(size, (0, Face::NONE));
-        for (wall, &id) in walls.iter().zip(zone.iter()) {
+        for (wall, &id) in walls[..count].iter().zip(zone.iter()) {
             let [a, b, c] = wall.v;
             for (i, (x, y)) in [(b, c), (c, a), (a, b)].into_iter().enumerate() {
                 let face = Face::new(id, i + 1);
