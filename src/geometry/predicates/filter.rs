@@ -164,14 +164,17 @@ impl Filter {
     /// [`UNDERFLOW`].
     #[inline(always)]
     pub(crate) fn lifted_determinant<M: Metric>(cell: [&Site; 4], e: &Site) -> (f64, f64) {
-        lifted_determinant::<f64, M>(cell.map(|s| (s.p, s.w)), (e.p, e.w))
+        let (det, reach2, lift) =
+            lifted_determinant::<f64, M>(cell.map(|s| (s.p, s.w)), (e.p, e.w));
+        (det, IN_SPHERE_BOUND * (reach2 * reach2.sqrt()) * lift)
     }
 
-    /// [`Filter::lifted_determinant`] for two cells at once.
+    /// [`Filter::lifted_determinant`] for two cells at once, of about some size.
     #[inline(always)]
     pub(crate) fn lifted_determinants<M: Metric>(
         [a, b]: [[&Site; 4]; 2],
         e: &Site,
+        size: Size,
     ) -> [(f64, f64); 2] {
         let pair = |i: usize| {
             let (s, t) = (a[i], b[i]);
@@ -179,12 +182,33 @@ impl Filter {
             ([x(0), x(1), x(2)], Pair::new([s.w, t.w]))
         };
         let p = e.p.map(Pair::splat);
-        let (det, bound) = lifted_determinant::<Pair, M>(
+        let (det, reach2, lift) = lifted_determinant::<Pair, M>(
             [pair(0), pair(1), pair(2), pair(3)],
             (p, Pair::splat(e.w)),
         );
+        let reach = reach2 * Pair::splat(size.slope) + Pair::splat(size.half);
+        let bound = Pair::splat(IN_SPHERE_BOUND) * (reach2 * reach) * lift;
         let (det, bound) = (det.to_array(), bound.to_array());
         [(det[0], bound[0]), (det[1], bound[1])]
+    }
+}
+
+/// A length `s` near the distances `M` of a call, for `M <= M^2 / 2s + s / 2`: a square root for each
+/// cell takes longer than the rest of the bound. Its few roundings are within the margin of
+/// [`IN_SPHERE_BOUND`].
+#[derive(Clone, Copy)]
+pub(crate) struct Size {
+    slope: f64,
+    half: f64,
+}
+
+impl Size {
+    /// The distance of two sites. If its square underflows, the bounds are infinite or not a number,
+    /// and nothing is decided by them.
+    #[inline(always)]
+    pub(crate) fn of(a: &Site, b: &Site) -> Self {
+        let length = norm2(difference(a.p, b.p)).sqrt();
+        Self { slope: 0.5 / length, half: 0.5 * length }
     }
 }
 
@@ -198,13 +222,13 @@ fn norm2<R: Real>(p: [R; 3]) -> R {
     p[0] * p[0] + p[1] * p[1] + p[2] * p[2]
 }
 
-/// The lifted determinant of four weighted points relative to a fifth, and its error bound, for
-/// one cell or in lanes.
+/// The lifted determinant of four weighted points relative to a fifth, the largest square of their
+/// distances to it, and a bound on their lifts, for one cell or in lanes.
 #[inline(always)]
 fn lifted_determinant<R: Real, M: Metric>(
     [a, b, c, d]: [([R; 3], R); 4],
     e: ([R; 3], R),
-) -> (R, R) {
+) -> (R, R, R) {
     let (ap, bp) = (difference(a.0, e.0), difference(b.0, e.0));
     let (cp, dp) = (difference(c.0, e.0), difference(d.0, e.0));
     // The four 3 x 3 minors share six 2 x 2 minors.
@@ -231,7 +255,7 @@ fn lifted_determinant<R: Real, M: Metric>(
     }
     // Two independent pairs, as the count of roundings in the head presumes.
     let det = (al * bcd - bl * cda) + (cl * dab - dl * abc);
-    (det, R::splat(IN_SPHERE_BOUND) * (reach2 * reach2.sqrt()) * lift)
+    (det, reach2, lift)
 }
 
 #[cold]
@@ -287,18 +311,11 @@ fn exact_power_test<M: Metric>(s: [&Site; 4], e: &Site, grid: Option<Grid>) -> S
 
 /// A double, or several in lanes.
 trait Real: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
-    fn splat(x: f64) -> Self;
     fn max(self, other: Self) -> Self;
     fn abs(self) -> Self;
-    fn sqrt(self) -> Self;
 }
 
 impl Real for f64 {
-    #[inline(always)]
-    fn splat(x: f64) -> Self {
-        x
-    }
-
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         // One instruction, unlike `f64::max`, which treats not-a-number; coordinates are finite.
@@ -309,22 +326,12 @@ impl Real for f64 {
     fn abs(self) -> Self {
         f64::abs(self)
     }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        f64::sqrt(self)
-    }
 }
 
 /// Two doubles.
 type Pair = ::wide::f64x2;
 
 impl Real for Pair {
-    #[inline(always)]
-    fn splat(x: f64) -> Self {
-        Self::splat(x)
-    }
-
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         self.fast_max(other)
@@ -333,11 +340,6 @@ impl Real for Pair {
     #[inline(always)]
     fn abs(self) -> Self {
         Self::abs(self)
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self::sqrt(self)
     }
 }
 

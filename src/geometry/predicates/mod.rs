@@ -28,8 +28,8 @@ use crate::Vec3;
 
 pub(crate) use crate::predicates::exact::{collinear as sites_collinear, highest_bit, lowest_bit};
 pub(crate) use crate::predicates::filter::{
-    Filter, Metric, Site, UNDERFLOW, Unweighted, Weighted, approximate_orientation, in_conflict,
-    in_conflict_given, lexicographic,
+    Filter, Metric, Site, Size, UNDERFLOW, Unweighted, Weighted, approximate_orientation,
+    in_conflict, in_conflict_given, lexicographic,
 };
 pub use crate::predicates::planar::{Point2, orient2d, project, projection_axis};
 pub(crate) use crate::predicates::power_size::{

@@ -24,7 +24,7 @@
 //! sphere meets that plane in the circle of the facet, and both are perturbed alike.
 
 use crate::predicates::{
-    Filter, Metric, Sign, Site, UNDERFLOW, approximate_orientation, in_conflict_given,
+    Filter, Metric, Sign, Site, Size, UNDERFLOW, approximate_orientation, in_conflict_given,
     sites_collinear,
 };
 use crate::triangulation::{
@@ -352,6 +352,8 @@ impl<M: Metric> Builder<'_, M> {
         self.zone.clear();
         self.zone.push(seed);
         self.state[seed as usize] = CONFLICT;
+        let near = self.cells[seed as usize].v[0];
+        let size = Size::of(&self.sites[vertex as usize], &self.sites[near as usize]);
         let mut generation = 0;
         while generation < self.zone.len() {
             let Some(front) = self.collect_front(generation) else {
@@ -359,7 +361,7 @@ impl<M: Metric> Builder<'_, M> {
                 return false;
             };
             generation = self.zone.len();
-            self.test_front(vertex, front);
+            self.test_front(vertex, front, size);
         }
         true
     }
@@ -405,7 +407,7 @@ impl<M: Metric> Builder<'_, M> {
     }
 
     /// Tests the first `count` candidates and appends those in conflict to the zone.
-    fn test_front(&mut self, vertex: u32, count: usize) {
+    fn test_front(&mut self, vertex: u32, count: usize, size: Size) {
         let Self { cells, sites, state, zone, front, filter, .. } = self;
         let (cells, sites, state) = (&cells[..], *sites, &mut state[..]);
         let site = &sites[vertex as usize];
@@ -414,7 +416,8 @@ impl<M: Metric> Builder<'_, M> {
         let mut pairs = front.chunks_exact_mut(2);
         for pair in &mut pairs {
             let finite = |i: usize| sites_of(sites, finite_side(cells, pair[i].cell));
-            let [first, second] = Filter::lifted_determinants::<M>([finite(0), finite(1)], site);
+            let [first, second] =
+                Filter::lifted_determinants::<M>([finite(0), finite(1)], site, size);
             (pair[0].det, pair[0].bound) = first;
             (pair[1].det, pair[1].bound) = second;
         }
@@ -422,7 +425,7 @@ impl<M: Metric> Builder<'_, M> {
             (candidate.det, candidate.bound) = determinant::<M>(cells, sites, candidate.cell, site);
         }
         // Branch-free append, as in `collect_front`.
-        let mut size = zone.len();
+        let mut length = zone.len();
         for &candidate in front.iter() {
             let Candidate { cell, det, bound } = candidate;
             // The usual case inline; the call is for doubtful signs and infinite cells.
@@ -433,8 +436,8 @@ impl<M: Metric> Builder<'_, M> {
                 conflicts_given::<M>(*filter, cells, sites, site, candidate)
             };
             zone.push(cell);
-            size += usize::from(conflict);
-            zone.truncate(size);
+            length += usize::from(conflict);
+            zone.truncate(length);
             state[cell as usize] |= u8::from(conflict) * CONFLICT;
         }
     }
