@@ -178,21 +178,18 @@ impl<'s, M: Metric> Builder<'s, M> {
         if !self.find_conflict_zone(vertex, seed) {
             return 0;
         }
-        let parts = |point: &dyn Fn(usize) -> Vec3| {
-            cuts.iter()
-                .enumerate()
-                .map(|(i, cut): (usize, &Cut)| u32::from(cut.is_below(point(i))) << i)
-                .sum::<u32>()
-        };
-        let side = parts(&|_| Vec3::from_array(self.sites[vertex as usize].p));
+        let position = Vec3::from_array(self.sites[vertex as usize].p);
+        let side = below(cuts, [position; 2]);
         let (mut all, mut any) = (u32::MAX, 0);
         for &c in &self.zone {
             for n in self.cells[c as usize].n {
-                let cell = decisive(&self.cells, n.cell());
-                let centres = Centre::BOTH.map(|centre| centre.of(cell, self.sites));
-                let parts = parts(&|i| centres[i / DIRECTIONS.len()]);
-                all &= parts;
-                any |= parts;
+                // Each cell once.
+                if std::mem::take(&mut self.state[n.cell() as usize]) != UNKNOWN {
+                    let cell = decisive(&self.cells, n.cell());
+                    let parts = below(cuts, Centre::BOTH.map(|centre| centre.of(cell, self.sites)));
+                    all &= parts;
+                    any |= parts;
+                }
             }
         }
         self.forget_zone();
@@ -359,6 +356,15 @@ impl<M: Metric> Part<'_, M> {
         sites.truncate(deferred);
         Ok(())
     }
+}
+
+/// The cuts that a point is below, one bit each; it is one point for each kind of centre.
+fn below(cuts: &[Cut; CUTS], points: [Vec3; 2]) -> u32 {
+    let (first, second) = cuts.split_at(DIRECTIONS.len());
+    (0..DIRECTIONS.len()).fold(0, |bits, i| {
+        let [first, second] = [first[i].is_below(points[0]), second[i].is_below(points[1])];
+        bits | u32::from(first) << i | u32::from(second) << (i + DIRECTIONS.len())
+    })
 }
 
 impl Cut {
