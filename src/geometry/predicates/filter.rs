@@ -156,7 +156,7 @@ impl Filter {
         if det.abs() > bound + UNDERFLOW || bound <= self.exact_power {
             Sign::of(det)
         } else {
-            precise_power_test::<M>(cell, e, self.grid)
+            precise_power_test::<M>(det, cell, e, self.grid)
         }
     }
 
@@ -258,45 +258,37 @@ fn lifted_determinant<R: Real, M: Metric>(
     (det, reach2, lift)
 }
 
-#[cold]
 #[inline(never)]
-fn precise_power_test<M: Metric>(cell: [&Site; 4], e: &Site, grid: Option<Grid>) -> Sign {
+fn precise_power_test<M: Metric>(det: f64, cell: [&Site; 4], e: &Site, grid: Option<Grid>) -> Sign {
     // On a grid the exact stage is as fast as this filter, and most calls are exact zeros.
-    if grid.is_none() {
-        let (det, bound) = permanent_bound::<M>(cell, e);
-        if det.abs() > bound {
-            return Sign::of(det);
-        }
+    if grid.is_none() && det.abs() > permanent_bound::<M>(cell, e) {
+        return Sign::of(det);
     }
     exact_power_test::<M>(cell, e, grid)
 }
 
-/// The determinant of [`Filter::lifted_determinant`], and a bound on its whole error from the
-/// permanent.
+/// A bound from the permanent on the whole error of [`Filter::lifted_determinant`].
 ///
 /// A product of degree 2 or 3 that underflows is off by `2^-1075`, and is multiplied by at most
 /// three further differences or by one and a lift; all of these are below `max(1, B)^2`.
-fn permanent_bound<M: Metric>(cell: [&Site; 4], e: &Site) -> (f64, f64) {
-    let (det, _) = Filter::lifted_determinant::<M>(cell, e);
-    let p = cell.map(|s| sub(&s.p, &e.p).map(f64::abs));
-    let minor = |i: usize, j: usize| p[i][0] * p[j][1] + p[j][0] * p[i][1];
-    let triple = |i: usize, j: usize, k: usize| {
-        p[i][2] * minor(j, k) + p[j][2] * minor(i, k) + p[k][2] * minor(i, j)
-    };
-    let lifts = [0, 1, 2, 3].map(|i: usize| {
-        let weight = if M::WEIGHTED { (e.w - cell[i].w).abs() } else { 0.0 };
-        p[i].iter().map(|x| x * x).sum::<f64>() + weight
-    });
-    let permanent = lifts[0] * triple(1, 2, 3)
-        + lifts[1] * triple(0, 2, 3)
-        + lifts[2] * triple(0, 1, 3)
-        + lifts[3] * triple(0, 1, 2);
+fn permanent_bound<M: Metric>(cell: [&Site; 4], e: &Site) -> f64 {
+    let from_e = |i: usize| difference(cell[i].p, e.p).map(f64::abs);
+    let (a, b, c, d) = (from_e(0), from_e(1), from_e(2), from_e(3));
+    let minor = |u: [f64; 3], v: [f64; 3]| u[0] * v[1] + v[0] * u[1];
+    let (ab, bc, cd) = (minor(a, b), minor(b, c), minor(c, d));
+    let (da, ac, bd) = (minor(d, a), minor(a, c), minor(b, d));
+    let lift =
+        |i: usize, u: [f64; 3]| norm2(u) + if M::WEIGHTED { (e.w - cell[i].w).abs() } else { 0.0 };
+    let (al, bl, cl, dl) = (lift(0, a), lift(1, b), lift(2, c), lift(3, d));
+    let permanent = al * (b[2] * cd + c[2] * bd + d[2] * bc)
+        + bl * (c[2] * da + d[2] * ac + a[2] * cd)
+        + cl * (d[2] * ab + a[2] * bd + b[2] * da)
+        + dl * (a[2] * bc + b[2] * ac + c[2] * ab);
     // At least 1, as the bound on underflow in the documentation needs.
-    let reach = lifts.into_iter().fold(1.0, f64::max);
-    (det, PERMANENT_BOUND * permanent + RELATIVE_UNDERFLOW * (reach * reach))
+    let reach = al.max(bl).max(cl.max(dl)).max(1.0);
+    PERMANENT_BOUND * permanent + RELATIVE_UNDERFLOW * (reach * reach)
 }
 
-#[cold]
 #[inline(never)]
 fn exact_power_test<M: Metric>(s: [&Site; 4], e: &Site, grid: Option<Grid>) -> Sign {
     // Equal weights cancel: the test without weights has narrower tiers.
