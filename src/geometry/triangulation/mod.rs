@@ -111,6 +111,8 @@ fn triangulate_dividing<M: Metric>(
         std::iter::once(dummy).chain(ids.iter().map(|&i| sites[i as usize])).collect::<Vec<_>>();
     build::bring_independent_to_front(&mut ordered, &mut ids)?;
     let cells = Builder::<M>::build(&ordered, &rounds, division, filter)?.cells;
+    // Memory is at its peak while cells are brought into order.
+    drop(ordered);
     let triangulation = order::freeze(cells, &ids, &along_curve);
     Ok(Triangulated { triangulation, repeated, filter })
 }

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use crate::hash::splitmix;
 use crate::predicates::{Site, lexicographic};
-use crate::triangulation::{Cell, CellId, Face, INFINITE, Triangulation, UNUSED, VertexId};
+use crate::triangulation::{Cell, CellId, Face, Triangulation, UNUSED, VertexId};
 
 /// Bits of a Hilbert index for each axis.
 const BITS: u32 = 16;
@@ -263,12 +263,7 @@ pub(super) fn freeze(mut cells: Vec<Cell>, ids: &[u32], along_curve: &[u32]) -> 
     });
     permute(&mut cells, places);
     cells.truncate(used);
-    let incident = first_cells(&cells, ids, along_curve.len());
-    cells.par_iter_mut().with_min_len(MIN_LEN).for_each(|cell| {
-        for v in &mut cell.v {
-            *v = if *v == INFINITE { VertexId::INFINITE.0 } else { ids[*v as usize - 1] };
-        }
-    });
+    let incident = name_vertices(&mut cells, ids, along_curve.len());
     // Repeated and hidden sites have no cell.
     let vertices = incident.iter().filter(|&&c| c != CellId::NONE).count();
     Triangulation { cells, finite, vertices, incident }
@@ -285,15 +280,17 @@ struct FinalOrder {
 }
 
 fn order_along_curve(cells: &[Cell], ids: &[u32], along_curve: &[u32]) -> FinalOrder {
-    let curve: Vec<u32> = ids.iter().map(|&id| along_curve[id as usize]).collect();
+    // By vertex; the one at infinity is first of no cell.
+    let places = ids.iter().map(|&id| along_curve[id as usize]);
+    let curve: Vec<u32> = std::iter::once(u32::MAX).chain(places).collect();
     let points = along_curve.len();
-    let first =
-        |sites: &[u32]| sites.iter().map(|&site: &u32| curve[site as usize - 1]).min().unwrap_or(0);
     // Three ranges of keys in one counting sort: finite cells, infinite cells, unused records.
-    let key = |cell: &Cell| match (cell.v[0], cell.is_infinite()) {
-        (UNUSED, _) => 2 * points as u32,
-        (_, true) => points as u32 + first(&cell.v[..3]),
-        (_, false) => first(&cell.v),
+    let key = |cell: &Cell| {
+        if cell.v[0] == UNUSED {
+            return 2 * points as u32;
+        }
+        let [a, b, c, d] = cell.v.map(|v| curve[v as usize]);
+        a.min(b).min(c.min(d)) + u32::from(cell.is_infinite()) * points as u32
     };
     let mut places: Vec<u32> = cells.par_iter().with_min_len(MIN_LEN).map(key).collect();
     // Counting sort: linear, and stable, so equal keys keep the order of the records.
@@ -355,13 +352,17 @@ fn exchange(cells: &mut [Cell], places: &mut [u32], size: usize) {
     }
 }
 
-/// For each input point its first cell.
-fn first_cells(cells: &[Cell], ids: &[u32], points: usize) -> Vec<CellId> {
-    // By site; entry 0 is the vertex at infinity. Backwards, so that the smallest id is written last.
-    let mut first = vec![CellId::NONE; ids.len() + 1];
-    for (c, cell) in cells.iter().enumerate().rev() {
-        for v in cell.v {
-            first[v as usize] = CellId(c as u32);
+/// Renames vertices from sites to input points; returns for each input point its first cell.
+fn name_vertices(cells: &mut [Cell], ids: &[u32], points: usize) -> Vec<CellId> {
+    // By vertex.
+    let names: Vec<u32> =
+        std::iter::once(VertexId::INFINITE.0).chain(ids.iter().copied()).collect();
+    let mut first = vec![CellId::NONE; names.len()];
+    // Backwards, so that the smallest id is written last.
+    for (c, cell) in cells.iter_mut().enumerate().rev() {
+        for v in &mut cell.v {
+            first[*v as usize] = CellId(c as u32);
+            *v = names[*v as usize];
         }
     }
     let mut incident = vec![CellId::NONE; points];
