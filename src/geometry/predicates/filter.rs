@@ -222,16 +222,11 @@ fn norm2<R: Real>(p: [R; 3]) -> R {
     p[0] * p[0] + p[1] * p[1] + p[2] * p[2]
 }
 
-/// The lifted determinant of four weighted points relative to a fifth, the largest square of their
-/// distances to it, and a bound on their lifts, for one cell or in lanes.
+/// The determinants of three of four points each: without the first, the second, the third, the last,
+/// in cyclic order.
 #[inline(always)]
-fn lifted_determinant<R: Real, M: Metric>(
-    [a, b, c, d]: [([R; 3], R); 4],
-    e: ([R; 3], R),
-) -> (R, R, R) {
-    let (ap, bp) = (difference(a.0, e.0), difference(b.0, e.0));
-    let (cp, dp) = (difference(c.0, e.0), difference(d.0, e.0));
-    // The four 3 x 3 minors share six 2 x 2 minors.
+fn minors<R: Real>([ap, bp, cp, dp]: [[R; 3]; 4]) -> [R; 4] {
+    // They share six 2 x 2 minors.
     let ab = ap[0] * bp[1] - bp[0] * ap[1];
     let bc = bp[0] * cp[1] - cp[0] * bp[1];
     let cd = cp[0] * dp[1] - dp[0] * cp[1];
@@ -242,6 +237,19 @@ fn lifted_determinant<R: Real, M: Metric>(
     let bcd = bp[2] * cd - cp[2] * bd + dp[2] * bc;
     let cda = cp[2] * da + dp[2] * ac + ap[2] * cd;
     let dab = dp[2] * ab + ap[2] * bd + bp[2] * da;
+    [bcd, cda, dab, abc]
+}
+
+/// The lifted determinant of four weighted points relative to a fifth, the largest square of their
+/// distances to it, and a bound on their lifts, for one cell or in lanes.
+#[inline(always)]
+fn lifted_determinant<R: Real, M: Metric>(
+    [a, b, c, d]: [([R; 3], R); 4],
+    e: ([R; 3], R),
+) -> (R, R, R) {
+    let (ap, bp) = (difference(a.0, e.0), difference(b.0, e.0));
+    let (cp, dp) = (difference(c.0, e.0), difference(d.0, e.0));
+    let [bcd, cda, dab, abc] = minors([ap, bp, cp, dp]);
     let (mut al, mut bl, mut cl, mut dl) = (norm2(ap), norm2(bp), norm2(cp), norm2(dp));
     let reach2 = al.max(bl).max(cl.max(dl));
     let mut lift = reach2;
@@ -370,8 +378,24 @@ pub(crate) fn in_conflict_given<M: Metric>(
     match filter.resolve::<M>(det, bound, cell, e) {
         Sign::Positive => true,
         Sign::Negative => false,
+        Sign::Zero if bound <= filter.exact_power => perturbed_exact(cell, e),
         Sign::Zero => perturbed(filter, cell, e),
     }
+}
+
+/// [`perturbed`] where the determinant was not rounded: then its minors, the cofactors, were not
+/// either, since they are shorter. Without branches, which would be unpredictable.
+#[inline(never)]
+fn perturbed_exact(cell: [&Site; 4], e: &Site) -> bool {
+    let p = |i: usize| sub(&cell[i].p, &e.p);
+    let [bcd, cda, dab, abc] = minors([p(0), p(1), p(2), p(3)]);
+    let (mut largest, mut sign) = (e, 0.0);
+    for (s, cofactor) in cell.into_iter().zip([bcd, -cda, dab, -abc]) {
+        let decides = precedes(&largest.p, &s.p) & (cofactor != 0.0);
+        largest = if decides { s } else { largest };
+        sign = if decides { cofactor } else { sign };
+    }
+    sign > 0.0
 }
 
 #[cold]
