@@ -213,18 +213,16 @@ impl Deref for Delaunay {
 
 /// Sites of weight zero, or the reason why a point cannot be one.
 pub(super) fn admissible_sites(points: &[Vec3]) -> Result<Vec<Site>, TriangulationError> {
-    points
-        .iter()
-        .enumerate()
-        .map(|(index, &point): (usize, &Vec3)| {
-            if !point.is_finite() {
-                return Err(TriangulationError::NotFinite { index, point });
-            }
-            if point.abs().max_element() > MAX_COORDINATE {
-                return Err(TriangulationError::OutOfRange { index, point });
-            }
-            // Adding zero makes -0.0 the same position as 0.0.
-            Ok(Site { p: (point + Vec3::ZERO).to_array(), w: 0.0 })
-        })
-        .collect()
+    let refused = |p: &Vec3| !p.is_finite() || p.abs().max_element() > MAX_COORDINATE;
+    if let Some(index) = points.par_iter().with_min_len(1024).position_first(refused) {
+        let point = points[index];
+        return Err(if point.is_finite() {
+            TriangulationError::OutOfRange { index, point }
+        } else {
+            TriangulationError::NotFinite { index, point }
+        });
+    }
+    // Adding zero makes -0.0 the same position as 0.0.
+    let site = |&point: &Vec3| Site { p: (point + Vec3::ZERO).to_array(), w: 0.0 };
+    Ok(points.par_iter().with_min_len(1024).map(site).collect())
 }

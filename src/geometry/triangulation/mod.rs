@@ -107,8 +107,9 @@ fn triangulate_dividing<M: Metric>(
     let filter = filter_of::<M>(sites);
     // Vertex 0 is the one at infinity: a read of its position by mistake must not look valid.
     let dummy = Site { p: [f64::NAN; 3], w: f64::NAN };
-    let mut ordered =
-        std::iter::once(dummy).chain(ids.iter().map(|&i| sites[i as usize])).collect::<Vec<_>>();
+    let mut ordered = Vec::with_capacity(ids.len() + 1);
+    ordered.push(dummy);
+    ordered.par_extend(ids.par_iter().with_min_len(1024).map(|&i: &u32| sites[i as usize]));
     build::bring_independent_to_front(&mut ordered, &mut ids)?;
     let cells = Builder::<M>::build(&ordered, &rounds, division, filter)?.cells;
     // Memory is at its peak while cells are brought into order.
