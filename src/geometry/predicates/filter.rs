@@ -446,3 +446,39 @@ pub(crate) fn lexicographic(a: &[f64; 3], b: &[f64; 3]) -> Ordering {
     }
     Ordering::Equal
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn perturbations_agree(p in prop::array::uniform5(prop::array::uniform3(-2..3i32))) {
+            if p.iter().enumerate().any(|(i, q)| p[..i].contains(q)) {
+                return Ok(());
+            }
+            let [a, b, c, d, e] = p.map(|p| Site { p: p.map(f64::from), w: 0.0 });
+            for cell in [[&a, &b, &c, &d], [&b, &a, &c, &d]] {
+                prop_assert_eq!(perturbed_exact(cell, &e), perturbed(Filter::ANY, cell, &e));
+            }
+        }
+
+        #[test]
+        fn bounds_of_pairs_are_no_smaller(
+            p in prop::array::uniform5(prop::array::uniform3(-1.0..1.0f64)),
+            length in -6..7i32,
+        ) {
+            let [a, b, c, d, e] = p.map(|p| Site { p, w: 0.0 });
+            let far = Site { p: [e.p[0] + 10f64.powi(length), e.p[1], e.p[2]], w: 0.0 };
+            let cell = [&a, &b, &c, &d];
+            let (det, bound) = Filter::lifted_determinant::<Unweighted>(cell, &e);
+            let size = Size::of(&e, &far);
+            for pair in Filter::lifted_determinants::<Unweighted>([cell, cell], &e, size) {
+                prop_assert_eq!(pair.0, det);
+                prop_assert!(pair.1 >= bound * (1.0 - 1e-15));
+            }
+        }
+    }
+}
