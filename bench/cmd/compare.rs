@@ -222,7 +222,7 @@ fn methods_of<'i>(items: impl IntoIterator<Item = &'i Item>) -> Vec<String> {
     labels.filter(|label| seen.insert(label.clone())).collect()
 }
 
-/// The pages during a run. They take at most about a tenth of its time.
+/// The pages during a run. They take at most about a thirtieth of its time.
 struct Pages<'r> {
     report: &'r RunReport<'r>,
     /// The state that the next page shows.
@@ -253,7 +253,7 @@ impl Pages<'_> {
         // A fault of the folder ends the run at the next record or at the last page.
         let _ = self.report.write(Some(running.clone()), draws);
         let kind = usize::from(draws);
-        self.due[kind] = Instant::now() + PAUSES[kind].max(10 * begun.elapsed());
+        self.due[kind] = Instant::now() + PAUSES[kind].max(30 * begun.elapsed());
     }
 }
 
