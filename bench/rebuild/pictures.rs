@@ -7,6 +7,7 @@ use medial::complex::MedialMesh;
 use medial::write_atomically;
 use medial_reports::render::{Background, Camera, ColourBy, Errors, Panel, Strip, strip};
 use medial_reports::{PictureStrip, Record, View3d, file_inside, picture_strips};
+use rayon::prelude::*;
 
 use crate::study::source::{Input, Source};
 
@@ -23,11 +24,12 @@ pub fn draw(dir: &Path, records: &[Record], sources: &[Source]) -> Vec<String> {
     if strips.is_empty() {
         return vec![];
     }
-    let inputs: BTreeMap<String, Input> = (sources.iter())
+    let inputs: BTreeMap<String, Input> = (sources.par_iter())
         .filter_map(|source| Input::load(source).ok())
         .map(|input| (input.hash.clone(), input))
         .collect();
-    (strips.iter())
+    // Side by side: packing a picture takes one thread.
+    (strips.par_iter())
         .filter_map(|wanted| {
             // By the hash of the surface that was measured.
             let input = wanted.mesh_hash.as_ref().and_then(|hash| inputs.get(hash));
