@@ -71,7 +71,7 @@ def render(
     size: tuple[int, int] = (800, 600),
     background: str = "white",
     max_error: float | None = None,
-    tolerance: float = 0.01,
+    tolerance: float = 0.02,
     names: Sequence[str] | None = None,
     threads: int | None = None,
     progress: Progress | None = None,

@@ -345,6 +345,12 @@ impl Side for SurfaceSide<'_> {
 /// deeper than this in any primitive.
 pub(super) const EXPOSED: f64 = 1e-12;
 
+/// The signed distance at the centre of a piece of some reach from which on a primitive buries all of it: any such
+/// primitive ends a search.
+pub(super) fn burying(reach: f64) -> f64 {
+    -(EXPOSED + reach) * (1.0 + 1e-9)
+}
+
 /// Initial parts of a cone's lateral around its axis.
 pub(super) const SECTORS: u32 = 6;
 
@@ -522,9 +528,7 @@ impl Side for UnionSide<'_> {
         if lipschitz <= enough && closest.distance <= known {
             return Bound { reached: 0.0, centre, upper: lipschitz };
         }
-        // Any primitive that buries the piece will do.
-        let buried = -(EXPOSED + reach) * (1.0 + 1e-9);
-        let deepest = self.union.deepest_or(centre, &mut 0, buried);
+        let deepest = self.union.deepest_or(centre, &mut 0, burying(reach));
         // The Lipschitz bound first: it costs nothing.
         if deepest.signed < -EXPOSED
             && (deepest.signed + reach < -EXPOSED

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 use super::ascent::{Hill, Peak, Start, ascend};
 use super::certificate::{
-    EXPOSED, Hulls, Piece, SECTORS, Side, UnionSide, farthest, lateral_normal, quartered,
+    EXPOSED, Hulls, Piece, SECTORS, Side, UnionSide, burying, farthest, lateral_normal, quartered,
 };
 use super::envelope::across;
 use super::samples::Pose;
@@ -316,9 +316,7 @@ impl Swept for SweptUnion<'_> {
         if upper <= enough {
             return None;
         }
-        // Any primitive that buries the piece will do.
-        let buried = -(EXPOSED + reach) * (1.0 + 1e-9);
-        let deepest = self.union.deepest_or(centre, &mut near.place, buried);
+        let deepest = self.union.deepest_or(centre, &mut near.place, burying(reach));
         let signed = deepest.signed;
         if signed < -EXPOSED && (signed + reach < -EXPOSED || is_buried_in(deepest.primitive)) {
             return None;
