@@ -158,27 +158,47 @@ struct Moves {
     vanished: u32,
 }
 
+/// A simplex in the list of the vertex that is removed first.
+struct Waiting<const K: usize> {
+    /// Ascending.
+    ranks: [u32; K],
+    /// The step that made it.
+    step: u32,
+    next: u32,
+}
+
+/// The end of a list.
+const NONE: u32 = u32::MAX;
+
 /// The counts of each step for the simplices of one dimension. The vertices of ranks 0, 1, ... are
 /// collapsed into the vertices of ranks `kept`; `ranks` holds the ranks of all vertices.
 ///
 /// A simplex with ascending ranks begins with the vertex that is removed first, and waits there for
 /// its image. So every simplex is touched once for each of its images.
 fn count_moves<const K: usize>(initial: &[[u32; K]], ranks: &[u32], kept: &[u32]) -> Vec<Moves> {
-    // With each simplex the step that made it. Initial ones are distinct, so theirs is never read.
-    let mut waiting: Vec<Vec<([u32; K], u32)>> = vec![Vec::new(); ranks.len()];
-    for simplex in initial {
-        let mut simplex = simplex.map(|v| ranks[v as usize]);
-        simplex.sort_unstable();
-        waiting[simplex[0] as usize].push((simplex, 0));
+    let mut first = vec![NONE; ranks.len()];
+    let mut simplices: Vec<Waiting<K>> = Vec::with_capacity(initial.len());
+    for (index, simplex) in (0..).zip(initial) {
+        let mut ranks = simplex.map(|v| ranks[v as usize]);
+        ranks.sort_unstable();
+        let next = std::mem::replace(&mut first[ranks[0] as usize], index);
+        // Initial simplices are distinct, so their step is never read.
+        simplices.push(Waiting { ranks, step: 0, next });
     }
     let mut moves = vec![Moves::default(); kept.len()];
+    let mut here = Vec::new();
     // Beyond the last step: survivors, among which merged simplices are still to be found.
-    for rank in 0..ranks.len() {
-        let mut here = std::mem::take(&mut waiting[rank]);
+    for rank in 0..first.len() {
+        here.clear();
+        let mut index = first[rank];
+        while let Some(waiting) = simplices.get(index as usize) {
+            here.push((waiting.ranks, waiting.step, index));
+            index = waiting.next;
+        }
         here.sort_unstable();
-        for (index, &(mut simplex, step)) in here.iter().enumerate() {
+        for (at, &(mut simplex, step, index)) in here.iter().enumerate() {
             // It merged when it was made, which is noticed only now: a search then would cost more.
-            if index > 0 && here[index - 1].0 == simplex {
+            if at > 0 && here[at - 1].0 == simplex {
                 moves[step as usize].merged += 1;
             } else if let Some(&kept) = kept.get(rank) {
                 if simplex.contains(&kept) {
@@ -186,7 +206,8 @@ fn count_moves<const K: usize>(initial: &[[u32; K]], ranks: &[u32], kept: &[u32]
                 } else {
                     simplex[0] = kept;
                     simplex.sort_unstable();
-                    waiting[simplex[0] as usize].push((simplex, rank as u32));
+                    let next = std::mem::replace(&mut first[simplex[0] as usize], index);
+                    simplices[index as usize] = Waiting { ranks: simplex, step: rank as u32, next };
                 }
             }
         }
