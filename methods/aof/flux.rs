@@ -42,7 +42,7 @@ use medial::complex::Sphere as Ball;
 use medial::geometry::planar_frame::PlanarFrame;
 use medial::shape::Shape;
 use medial::simplifier::RunContext;
-use medial::surface::{Closest, Feature, InsideTest, TriMesh, TriangleBvh};
+use medial::surface::{Closest, Feature, InsideTest, TriMesh, TriangleBvh, Vicinity};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -149,19 +149,61 @@ impl Surface {
 
     /// `AOF'` through a sphere around a centre, whose closest face is `start`.
     pub fn flux(&self, sphere: &Sphere, centre: Vec3, start: u32) -> f64 {
+        self.near(centre, sphere.radius, start).flux(sphere, centre, start)
+    }
+
+    /// The surface near a ball, whose closest face is `start`; see [`TriangleBvh::vicinity`].
+    pub(super) fn near(&self, centre: Vec3, radius: f64, start: u32) -> Near<'_> {
+        Near { surface: self, vicinity: self.tree.vicinity(centre, radius, Some(start)) }
+    }
+}
+
+/// The surface near a ball.
+pub(super) struct Near<'a> {
+    surface: &'a Surface,
+    vicinity: Option<Vicinity<'a>>,
+}
+
+impl Near<'_> {
+    /// The surface near a ball inside this one, whose closest face is `start`.
+    pub fn within(&self, centre: Vec3, radius: f64, start: u32) -> Self {
+        let Some(vicinity) = &self.vicinity else {
+            return self.surface.near(centre, radius, start);
+        };
+        Self { surface: self.surface, vicinity: vicinity.narrowed(centre, radius, start) }
+    }
+
+    /// The closest point to a point of the ball. The search is faster with a face `start` near to it.
+    pub fn closest(&self, p: Vec3, start: u32) -> Closest {
+        match &self.vicinity {
+            Some(vicinity) => vicinity.closest_from(p, start),
+            None => self.surface.closest(p, Some(start)),
+        }
+    }
+
+    /// The closest point to a point of the ball, if it is not farther away than `bound`.
+    fn closest_within(&self, p: Vec3, bound: f64) -> Option<Closest> {
+        match &self.vicinity {
+            Some(vicinity) => vicinity.closest_within(p, bound),
+            None => self.surface.tree.closest_within_from(p, bound, None),
+        }
+    }
+
+    /// `AOF'` through a sphere around the centre of the ball, whose closest face is `start`.
+    pub fn flux(&self, sphere: &Sphere, centre: Vec3, start: u32) -> f64 {
         let mut sum = 0.0;
         // Samples that follow each other are neighbours, mostly with the same closest face.
         let mut face = start;
         for &normal in &sphere.directions {
             let p = centre + normal * sphere.radius;
-            let closest = self.closest(p, Some(face));
+            let closest = self.closest(p, face);
             face = closest.face;
             let gradient = gradient(p, &closest);
             let along = gradient.dot(normal);
-            let adds = !self.is_fan(&closest) || {
+            let adds = !self.surface.is_fan(&closest) || {
                 let step = -2.0 * sphere.radius * along;
                 let bound = (closest.distance + step) * (1.0 - SAME);
-                along < 0.0 && self.tree.any_within(p + gradient * step, bound)
+                along < 0.0 && self.closest_within(p + gradient * step, bound).is_some()
             };
             if adds {
                 sum += along;
@@ -267,16 +309,17 @@ impl Surface {
 
     fn refined(&self, sphere: &Sphere, centre: Vec3) -> Refined {
         let own = self.closest(centre, None);
+        let near = self.near(centre, sphere.radius, own.face);
         let mut face = own.face;
         let mut rays = Vec::with_capacity(sphere.directions.len());
         for &normal in &sphere.directions {
             let start = centre + normal * sphere.radius;
-            let closest = self.closest(start, Some(face));
+            let closest = near.closest(start, face);
             face = closest.face;
             let gradient = gradient(start, &closest);
             let along = gradient.dot(normal);
             if along < 0.0 {
-                rays.push((along, Ray { surface: self, start, gradient, closest }));
+                rays.push((along, Ray { near: &near, start, gradient, closest }));
             }
         }
         // Most inward first: these rays pass closest to the centre. Stable, so ties are by sample.
@@ -286,7 +329,7 @@ impl Surface {
             .filter_map(|(along, ray)| {
                 let length = -2.0 * sphere.radius * along;
                 let (centre, contacts) = ray.localise(length, TOLERANCE * sphere.radius)?;
-                let distance = self.closest(centre, Some(ray.closest.face)).distance;
+                let distance = near.closest(centre, ray.closest.face).distance;
                 Some(Refined { ball: Ball::new(centre, distance), contacts })
             })
             .take(FOLLOWED_SAMPLES);
@@ -299,7 +342,7 @@ impl Surface {
 
 /// The ray from a closest point through its sample.
 struct Ray<'a> {
-    surface: &'a Surface,
+    near: &'a Near<'a>,
     start: Vec3,
     gradient: Vec3,
     /// The closest point of the start.
@@ -312,7 +355,7 @@ impl Ray<'_> {
     fn other(&self, t: f64) -> Option<Vec3> {
         let bound = (self.closest.distance + t) * (1.0 - SAME_ON_RAY);
         let q = self.start + self.gradient * t;
-        self.surface.tree.closest_within_from(q, bound, None).map(|other| other.point)
+        self.near.closest_within(q, bound).map(|other| other.point)
     }
 
     /// Step 2: the point and its two closest points.

@@ -25,7 +25,7 @@ use medial::simplifier::RunContext;
 use medial::surface::{Closest, Side, TriMesh};
 use rayon::prelude::*;
 
-use super::flux::{Sphere, Surface};
+use super::flux::{Near, Sphere, Surface};
 use super::{AofParams, Dismiss, Start};
 use crate::Result;
 
@@ -482,18 +482,22 @@ impl Walk<'_> {
         for z in block.lo[2]..block.hi[2] {
             for y in block.lo[1]..block.hi[1] {
                 for x in block.lo[0]..block.hi[0] {
-                    self.visit(0, [x, y, z].map(|i| i * self.grid.split), known);
+                    self.visit(0, [x, y, z].map(|i| i * self.grid.split), known, None);
                 }
             }
         }
     }
 
     /// Steps 2 to 4 for the voxel of a level whose lowest finest voxel is at `base`.
-    fn visit(&mut self, level: usize, base: [u32; 3], mut known: Known) {
+    /// `around` is the surface near its parent.
+    fn visit(&mut self, level: usize, base: [u32; 3], mut known: Known, around: Option<&Near<'_>>) {
         let LatticeLevel { ref sphere, size, dismissed_from } = self.levels[level];
         let middle = Vec3::from(base.map(|i| f64::from(i) + f64::from(size) * 0.5));
         let centre = self.grid.origin + middle * self.grid.side;
-        let Closest { distance, face, .. } = self.surface.closest(centre, Some(known.face));
+        let Closest { distance, face, .. } = match around {
+            Some(near) => near.closest(centre, known.face),
+            None => self.surface.closest(centre, Some(known.face)),
+        };
         known.face = face;
         // Farthest centre of a descendant.
         let spread = HALF_DIAGONAL * (sphere.radius - self.grid.side);
@@ -510,11 +514,17 @@ impl Walk<'_> {
             known.is_inside = true;
         }
         let evaluate = !known.dismissed && self.wanted != Wanted::Places && sphere_fits;
-        let flux = if evaluate {
-            self.tally.evaluated += 1;
-            self.surface.flux(sphere, centre, face)
-        } else {
-            0.0
+        // The spheres of all descendants lie in that of the voxel.
+        let near = (evaluate || self.wanted != Wanted::Places && !finest).then(|| match around {
+            Some(near) => near.within(centre, sphere.radius, face),
+            None => self.surface.near(centre, sphere.radius, face),
+        });
+        let flux = match &near {
+            Some(near) if evaluate => {
+                self.tally.evaluated += 1;
+                near.flux(sphere, centre, face)
+            }
+            _ => 0.0,
         };
         if finest {
             self.emit(base, distance, flux);
@@ -537,7 +547,12 @@ impl Walk<'_> {
         }
         let step = self.levels[level + 1].size;
         for at in cube(size / step) {
-            self.visit(level + 1, [0, 1, 2].map(|axis| base[axis] + at[axis] * step), known);
+            self.visit(
+                level + 1,
+                [0, 1, 2].map(|axis| base[axis] + at[axis] * step),
+                known,
+                near.as_ref(),
+            );
         }
     }
 

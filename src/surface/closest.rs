@@ -233,6 +233,29 @@ impl TriangleBvh {
         });
     }
 
+    /// The triangles that can be closest to a point of a ball; `None` where they are too many for
+    /// searches among them to be faster. A face `start` near to the centre speeds this up.
+    ///
+    /// # Panics
+    /// If `start` is not a face.
+    pub fn vicinity(&self, centre: Vec3, radius: f64, start: Option<u32>) -> Option<Vicinity<'_>> {
+        let query = self.wide.query(centre)?;
+        let foot = self.closest_from(centre, start);
+        let mut search = Collect::new(self, centre, radius, &foot);
+        let limit = query.limit(search.reach);
+        let foot = self.wide.query(foot.point)?;
+        self.wide.rivals(&query, &foot, search.least, radius, |leaf| {
+            let places = self.wide.leaves()[leaf].clone();
+            let mut near = self.blocks[leaf].within(&query, limit) & ((1 << places.len()) - 1);
+            while near != 0 {
+                search.add(places.start + near.trailing_zeros());
+                near &= near - 1;
+            }
+            !search.is_full()
+        });
+        search.finish()
+    }
+
     fn closest_at(&self, p: Vec3, start: u32) -> (u32, Closest) {
         let found = self.nearest(Nearest::starting(self, p, start as usize));
         (found.place as u32, self.describe(p, found.place, found.squared))
@@ -338,6 +361,175 @@ impl<'a> Nearest<'a> {
             self.place = place;
             self.squared = squared;
         }
+    }
+}
+
+/// The triangles that can be closest to a point of a ball, to search again and again without the
+/// tree. The results are those of the tree.
+///
+/// The distance to a triangle is convex, so its tangent in the centre is a lower bound: searches
+/// measure the triangles whose tangents are below the best distance.
+#[derive(Clone, Debug)]
+pub struct Vicinity<'a> {
+    bvh: &'a TriangleBvh,
+    centre: Vec3,
+    radius: f64,
+    tangents: Vec<Tangents>,
+}
+
+/// The tangents of four triangles in single precision, in the [`Frame`] of the wide tree. Lanes
+/// without a triangle are infinitely far.
+#[derive(Clone, Copy, Debug)]
+struct Tangents {
+    gradient: [Lanes; 3],
+    /// In the centre.
+    distance: Lanes,
+    places: [u32; 4],
+}
+
+/// Bound on the error of a tangent in single precision, per unit of distance and radius: five
+/// roundings.
+const TANGENT_BLUR: f64 = 1e-6;
+
+impl<'a> Vicinity<'a> {
+    /// The closest point to a point of the ball. A face `start` near to it speeds up the search; the
+    /// result does not depend on it.
+    pub fn closest_from(&self, p: Vec3, start: u32) -> Closest {
+        let place = self.bvh.places[start as usize];
+        let found = self.nearest(Nearest::starting(self.bvh, p, place as usize));
+        self.bvh.describe(p, found.place, found.squared)
+    }
+
+    /// As [`TriangleBvh::closest_within_from`] for a point of the ball.
+    pub fn closest_within(&self, p: Vec3, bound: f64) -> Option<Closest> {
+        if bound.is_nan() || bound < 0.0 {
+            return None;
+        }
+        let found = self.nearest(Nearest::within(self.bvh, p, bound));
+        (found.place != NONE).then(|| self.bvh.describe(p, found.place, found.squared))
+    }
+
+    /// That of a ball inside this one, which has the closest face `start`.
+    pub fn narrowed(&self, centre: Vec3, radius: f64, start: u32) -> Option<Self> {
+        let foot = self.closest_from(centre, start);
+        let mut search = Collect::new(self.bvh, centre, radius, &foot);
+        let limit = self.limit(search.reach);
+        for tangents in &self.tangents {
+            tangents.each_within(&self.offset(centre), limit, |place| search.add(place));
+        }
+        search.finish()
+    }
+
+    fn nearest(&self, mut search: Nearest<'a>) -> Nearest<'a> {
+        let offset = self.offset(search.p);
+        let mut limit = self.limit(search.reach());
+        for tangents in &self.tangents {
+            let before = search.squared;
+            tangents.each_within(&offset, limit, |place| search.measure(place as usize));
+            if search.squared < before {
+                limit = self.limit(search.reach());
+            }
+        }
+        search
+    }
+
+    /// A point relative to the centre, in the frame.
+    #[inline]
+    fn offset(&self, p: Vec3) -> [Lanes; 3] {
+        let v = (p - self.centre) * self.bvh.wide.frame().scale;
+        v.to_array().map(|x| Lanes::splat(x as f32))
+    }
+
+    /// The largest computed tangent whose true value may be `distance` or less.
+    #[inline]
+    fn limit(&self, distance: f64) -> Lanes {
+        let blur = TANGENT_BLUR * (distance + self.radius) + 4.0 * self.bvh.slack;
+        Lanes::splat(((distance + blur) * self.bvh.wide.frame().scale) as f32)
+    }
+}
+
+impl Tangents {
+    #[inline]
+    fn each_within(&self, offset: &[Lanes; 3], limit: Lanes, mut each: impl FnMut(u32)) {
+        let lower = self.distance + dot(&self.gradient, offset);
+        let mut near = lower.simd_le(limit).to_bitmask();
+        while near != 0 {
+            each(self.places[near.trailing_zeros() as usize]);
+            near &= near - 1;
+        }
+    }
+}
+
+/// More triangles are searched in the tree.
+const MAX_VICINITY: usize = 192;
+
+/// Collects a [`Vicinity`].
+struct Collect<'a> {
+    bvh: &'a TriangleBvh,
+    centre: Vec3,
+    radius: f64,
+    /// Distance of the centre.
+    least: f64,
+    /// The gradient there; none where distances to a point of the ball may be 0, which have no tangent.
+    gradient: Option<Vec3>,
+    /// Distance of the centre beyond which no triangle is closest to a point of the ball.
+    reach: f64,
+    found: Vec<(f64, Vec3, u32)>,
+}
+
+impl<'a> Collect<'a> {
+    fn new(bvh: &'a TriangleBvh, centre: Vec3, radius: f64, foot: &Closest) -> Self {
+        let least = foot.distance;
+        let gradient = (least > radius).then(|| (centre - foot.point) / least);
+        let reach = padded(least + 2.0 * radius, bvh.slack);
+        Self { bvh, centre, radius, least, gradient, reach, found: Vec::new() }
+    }
+
+    /// Adds a triangle, unless the foot of the centre is nearer to all points of the ball.
+    fn add(&mut self, place: u32) {
+        let squared = self.bvh.frames[place as usize].distance_squared(self.centre);
+        let distance = squared.sqrt();
+        let Some(gradient) = self.gradient else {
+            if distance <= self.reach {
+                self.found.push((distance - self.radius, Vec3::ZERO, place));
+            }
+            return;
+        };
+        let closest = self.bvh.describe(self.centre, place as usize, squared);
+        let own = (self.centre - closest.point) / distance;
+        // The foot is no farther from the point `v` away from the centre than the tangent there plus
+        // `v² / 2 d`, and the triangle no nearer than its own tangent.
+        let bend = self.radius * self.radius / (2.0 * self.least);
+        let reach = self.least + gradient.distance(own) * self.radius + bend;
+        if distance <= padded(reach, 4.0 * self.bvh.slack) {
+            self.found.push((distance, own, place));
+        }
+    }
+
+    fn is_full(&self) -> bool {
+        self.found.len() > MAX_VICINITY
+    }
+
+    fn finish(mut self) -> Option<Vicinity<'a>> {
+        if self.is_full() {
+            return None;
+        }
+        // The likeliest first.
+        self.found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let scale = self.bvh.wide.frame().scale;
+        let tangents = self.found.chunks(4).map(|four| {
+            let of = |k: usize| four.get(k).copied().unwrap_or((f64::INFINITY, Vec3::ZERO, 0));
+            let lanes = |value: &dyn Fn((f64, Vec3, u32)) -> f64| {
+                Lanes::from([0, 1, 2, 3].map(|k| value(of(k)) as f32))
+            };
+            Tangents {
+                gradient: [0, 1, 2].map(|axis| lanes(&|(_, gradient, _)| gradient[axis])),
+                distance: lanes(&|(distance, ..)| distance * scale),
+                places: [0, 1, 2, 3].map(|k| of(k).2),
+            }
+        });
+        let tangents = tangents.collect();
+        Some(Vicinity { bvh: self.bvh, centre: self.centre, radius: self.radius, tangents })
     }
 }
 

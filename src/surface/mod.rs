@@ -30,7 +30,7 @@ use serde::Serialize;
 
 use crate::Vec3;
 
-pub use closest::{BvhError, Closest, Feature, TriangleBvh};
+pub use closest::{BvhError, Closest, Feature, TriangleBvh, Vicinity};
 pub use contract::{Contraction, Folds, contract_short_edges, crust_surface};
 pub use creases::{SharpEdge, sharp_edges, smooth_normals};
 pub use inside::{InsideTest, Side, SignedDistance};

@@ -93,6 +93,44 @@ fn closest_points_match_brute_force() {
 }
 
 #[test]
+fn a_vicinity_has_the_closest_points_of_the_tree() {
+    let mut rng = Pcg64::seed_from_u64(12);
+    for scale in [1.0, 1e-60, 1e60] {
+        let mut mesh = soup(400, &mut rng);
+        mesh.vertices.iter_mut().for_each(|v| *v *= scale);
+        let bvh = TriangleBvh::new(&mesh).unwrap();
+        for k in 0..600 {
+            // Around points of the surface, and around others; down to balls that are points.
+            let near = vector(&mut rng) * scale;
+            let centre = if k % 5 == 0 { bvh.closest(near).point } else { near };
+            let radius = scale * [0.3, 1e-2, 1e-4, 1e-9, 0.0][k % 5] * rng.random::<f64>();
+            let vicinity = bvh.vicinity(centre, radius, Some(k as u32 % 400)).expect("is small");
+            let inner = centre + vector(&mut rng).normalize() * (0.5 * radius);
+            let start = bvh.closest(inner).face;
+            let narrowed = vicinity.narrowed(inner, 0.5 * radius, start).expect("is small");
+            for _ in 0..10 {
+                let direction = vector(&mut rng).normalize();
+                for (vicinity, p) in [
+                    (&vicinity, centre + direction * radius),
+                    (&narrowed, inner + direction * (0.5 * radius)),
+                ] {
+                    let closest = bvh.closest(p);
+                    assert_eq!(vicinity.closest_from(p, start), closest);
+                    for bound in [closest.distance, closest.distance * 0.999] {
+                        let within = bvh.closest_within_from(p, bound, None);
+                        assert_eq!(vicinity.closest_within(p, bound), within);
+                    }
+                }
+            }
+        }
+    }
+    // Of many triangles equally far away none can be left out.
+    let sphere: Vec<_> = (0..2000).map(|_| [vector(&mut rng).normalize(); 3]).collect();
+    let bvh = TriangleBvh::from_triangles(&sphere).unwrap();
+    assert!(bvh.vicinity(Vec3::ZERO, 0.1, None).is_none());
+}
+
+#[test]
 fn features_are_distinguished() {
     let vertices = vec![Vec3::ZERO, Vec3::X, 2.0 * Vec3::Y];
     for turn in 0..3 {

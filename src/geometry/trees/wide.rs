@@ -203,6 +203,36 @@ impl WideTree {
         self.search(limit, |place| self.nodes[place].distance_squared(query), visit);
     }
 
+    /// Shows the leaves with points that may be nearer than `foot` to a point of the ball around a
+    /// query, whose distance from the foot is `distance`, until `visit` returns false.
+    ///
+    /// A point `q` is nearer to some `p + v` of the ball around `p` than the foot `f` if and only if
+    /// `|q - p|² - 2 r |q - f| < |f - p|²`.
+    pub fn rivals(
+        &self,
+        query: &Query,
+        foot: &Query,
+        distance: f64,
+        radius: f64,
+        mut visit: impl FnMut(usize) -> bool,
+    ) {
+        let (distance, radius) = (distance * query.scale, radius * query.scale);
+        // The error of a squared distance, in the whole range where boxes can be near enough, and that
+        // of a distance from the foot.
+        let blur =
+            2.0 * query.blur * (distance + 3.0 * radius + query.blur) + 2.0 * radius * foot.blur;
+        let limit = ((distance * distance + blur) * (1.0 + 1e-6)) as f32;
+        let diameter = Lanes::splat((2.0 * radius) as f32);
+        self.search(
+            limit,
+            |place| {
+                let node = &self.nodes[place];
+                node.distance_squared(query) - diameter * node.farthest_squared(foot).sqrt()
+            },
+            |leaf, _| if visit(leaf) { limit } else { f32::NEG_INFINITY },
+        );
+    }
+
     /// As [`WideTree::nearest`] with another measure: `bounds` gives lower bounds for the children of
     /// the node at a place. A bound that is not a number is beyond every limit.
     #[inline]
