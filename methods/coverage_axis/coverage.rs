@@ -103,11 +103,6 @@ pub(super) fn size(bits: &Bits) -> usize {
     bits.iter().map(|word| word.count_ones() as usize).sum()
 }
 
-/// Number of members of both.
-pub(super) fn common(a: &Bits, b: &Bits) -> usize {
-    a.iter().zip(b).map(|(a, b)| (a & b).count_ones() as usize).sum()
-}
-
 /// Whether all members of `a` are in `b`.
 pub(super) fn is_subset(a: &Bits, b: &Bits) -> bool {
     a.iter().zip(b).all(|(a, b)| a & !b == 0)
@@ -125,9 +120,6 @@ pub(super) fn subtract(bits: &mut Bits, less: &Bits) {
 
 // ----------------------------------------------------------------------------
 // The choice of Coverage Axis++: one sphere after the other, by a score of three parts.
-
-/// Candidates that one task scores.
-const TASK: usize = 4096;
 
 /// The spheres chosen, in the order in which they were.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -155,7 +147,7 @@ impl Score {
             Penalty::Ratio => spheres.iter().map(|ball| 0.1 * largest / ball.radius).collect(),
             Penalty::Stand => {
                 let inverse: Vec<f64> = spheres.iter().map(|ball| 1.0 / ball.radius).collect();
-                let scale = Standard::of(inverse.iter().copied());
+                let [scale] = Standard::of(inverse.iter().map(|&x| [x]));
                 inverse.iter().map(|&x| scale.score(x)).collect()
             }
         };
@@ -171,7 +163,7 @@ impl Score {
 /// taken once; of equal scores the first wins.
 ///
 /// # Cost
-/// `O(n m / 64)` for each step, with `n` candidates and `m` samples.
+/// `O(n)` for each step, with `n` candidates, and `O(n m / 64)` once, with `m` samples.
 pub(super) fn choose(
     spheres: &[Sphere],
     coverage: &Coverage,
@@ -183,22 +175,31 @@ pub(super) fn choose(
     let uncoverable = coverage.columns() - size(&uncovered);
     let mut left = size(&uncovered);
     let mut is_chosen = vec![false; spheres.len()];
-    // Squared distances to the nearest sphere chosen; none yet.
+    // Distances to the nearest sphere chosen; none yet.
     let mut nearest = vec![f64::INFINITY; spheres.len()];
-    let mut counts = vec![0_u32; spheres.len()];
+    // Each sample is covered once, and then only the candidates that cover it too are counted down.
+    let covering = coverage.transposed();
+    let mut counts: Vec<u32> =
+        (0..spheres.len()).map(|ball| size(coverage.row(ball)) as u32).collect();
     let mut chosen = Vec::new();
     let total = left;
     while left > 0 && chosen.len() < limit.min(spheres.len()) {
         run.step(total - left, total)?;
-        counts.par_iter_mut().with_min_len(TASK).enumerate().for_each(|(ball, count)| {
-            *count = common(coverage.row(ball), &uncovered) as u32;
-        });
         let best = best(&counts, &nearest, &is_chosen, score, chosen.is_empty());
         let centre = spheres[best].centre;
-        nearest.par_iter_mut().with_min_len(TASK).zip(spheres).for_each(|(nearest, ball)| {
-            *nearest = nearest.min(ball.centre.distance_squared(centre));
-        });
-        subtract(&mut uncovered, coverage.row(best));
+        for (nearest, ball) in nearest.iter_mut().zip(spheres) {
+            let squared = ball.centre.distance_squared(centre);
+            // Rarely, so that few roots are taken.
+            if squared < *nearest * *nearest {
+                *nearest = nearest.min(squared.sqrt());
+            }
+        }
+        let mut fresh = coverage.row(best).to_vec();
+        fresh.iter_mut().zip(&uncovered).for_each(|(a, b)| *a &= b);
+        for ball in ones(&fresh).flat_map(|sample| ones(covering.row(sample))) {
+            counts[ball] -= 1;
+        }
+        subtract(&mut uncovered, &fresh);
         left = size(&uncovered);
         is_chosen[best] = true;
         chosen.push(best as u32);
@@ -215,15 +216,15 @@ fn best(
     score: &Score,
     is_first: bool,
 ) -> usize {
-    let by_count = Standard::of(counts.iter().map(|&count| f64::from(count)));
+    let both = counts.iter().zip(nearest);
+    let [by_count, mut by_distance] = Standard::of(both.map(|(&c, &d)| [f64::from(c), d]));
     // Nothing is chosen in the first step, so no distance counts.
-    let by_distance = match is_first {
-        true => Standard { mean: 0.0, deviation: 0.0 },
-        false => Standard::of(nearest.iter().map(|squared| squared.sqrt())),
-    };
+    if is_first {
+        by_distance = Standard { mean: 0.0, deviation: 0.0 };
+    }
     let free = (0..counts.len()).filter(|&ball| !is_chosen[ball]);
     let scored = free.map(|ball| {
-        let distance = if is_first { 0.0 } else { nearest[ball].sqrt() };
+        let distance = if is_first { 0.0 } else { nearest[ball] };
         let value = by_count.score(f64::from(counts[ball]))
             + score.uniformity * by_distance.score(distance)
             - score.penalties[ball];
@@ -241,12 +242,20 @@ struct Standard {
 }
 
 impl Standard {
-    /// With the divisor `n - 1`. One thread: sums in another order would be other scores.
-    fn of(values: impl ExactSizeIterator<Item = f64> + Clone) -> Self {
+    /// Those of `K` values of each candidate, with the divisor `n - 1`. One thread: sums in another
+    /// order would be other scores.
+    fn of<const K: usize>(values: impl ExactSizeIterator<Item = [f64; K]> + Clone) -> [Self; K] {
         let count = values.len() as f64;
-        let mean = values.clone().sum::<f64>() / count;
-        let squares: f64 = values.map(|value| (value - mean) * (value - mean)).sum();
-        Self { mean, deviation: (squares / (count - 1.0).max(1.0)).sqrt() }
+        let (mut means, mut squares) = ([0.0; K], [0.0; K]);
+        for values in values.clone() {
+            (0..K).for_each(|k| means[k] += values[k]);
+        }
+        means.iter_mut().for_each(|mean| *mean /= count);
+        for values in values {
+            (0..K).for_each(|k| squares[k] += (values[k] - means[k]) * (values[k] - means[k]));
+        }
+        let deviations = squares.map(|squares| (squares / (count - 1.0).max(1.0)).sqrt());
+        std::array::from_fn(|k| Self { mean: means[k], deviation: deviations[k] })
     }
 
     /// 0 where all values are equal: the quotient of the formula is then 0/0.
