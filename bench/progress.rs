@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use medial::simplifier::Progress as Steps;
+use medial_methods::usual_seconds;
 use medial_reports::printable;
 
 /// Interval between updates of a line.
@@ -93,16 +94,22 @@ impl Progress {
     }
 }
 
-/// Seconds of the turns ahead: for each the mean of its method so far, or of all methods where it had no turn. `None`
-/// before the first turn is done.
+/// Seconds of the turns ahead: for each the mean of its method so far, or what it usually takes in proportion to the
+/// methods so far. `None` before the first turn is done.
 fn estimate(seen: &[(String, f64)], ahead: &[String]) -> Option<f64> {
-    let mean = |of: &dyn Fn(&str) -> bool| {
-        let seconds = seen.iter().filter(|(method, _)| of(method)).map(|(_, seconds)| *seconds);
-        let (number, sum) = seconds.fold((0, 0.0), |(number, sum), s| (number + 1, sum + s));
-        (number > 0).then(|| sum / f64::from(number))
+    let sum = |of: &dyn Fn(&str) -> f64| seen.iter().map(|(method, _)| of(method)).sum::<f64>();
+    let seconds: f64 = seen.iter().map(|(_, seconds)| seconds).sum();
+    // Methods from elsewhere count as the mean of those so far.
+    let mean = sum(&|id| usual_seconds(id).unwrap_or(0.0))
+        / sum(&|id| f64::from(usual_seconds(id).is_some()));
+    let usual = |id: &str| usual_seconds(id).unwrap_or(if mean > 0.0 { mean } else { 1.0 });
+    let slowness = seconds / sum(&usual);
+    let turn = |method: &String| {
+        let own = seen.iter().filter(|(id, _)| id == method).map(|(_, seconds)| *seconds);
+        let (number, sum) = own.fold((0.0, 0.0), |(number, sum), s| (number + 1.0, sum + s));
+        if number > 0.0 { sum / number } else { slowness * usual(method) }
     };
-    let all = mean(&|_| true)?;
-    Some(ahead.iter().map(|method| mean(&|seen| seen == method).unwrap_or(all)).sum())
+    (!seen.is_empty()).then(|| ahead.iter().map(turn).sum())
 }
 
 impl Drop for Progress {
@@ -186,7 +193,11 @@ mod tests {
         let seen = [("qmat".to_owned(), 1.0), ("aof".to_owned(), 20.0), ("qmat".to_owned(), 3.0)];
         assert_eq!(estimate(&seen[..0], &text(&["qmat"])), None);
         assert_eq!(estimate(&seen, &text(&["qmat", "aof", "aof"])), Some(42.0));
-        assert_eq!(estimate(&seen, &text(&["hem"])), Some(8.0), "the mean of all");
+        let hem = estimate(&seen, &text(&["hem"])).unwrap();
+        let share = usual_seconds("hem").unwrap()
+            / (2.0 * usual_seconds("qmat").unwrap() + usual_seconds("aof").unwrap());
+        assert!((hem - 24.0 * share).abs() < 1e-9, "{hem}");
+        assert_eq!(estimate(&[("theirs".to_owned(), 5.0)], &text(&["others"])), Some(5.0));
     }
 
     #[test]
