@@ -43,6 +43,7 @@ pub mod complex;
 mod diagnostics;
 pub mod heap;
 pub mod metrics;
+pub mod range_queue;
 pub mod shape;
 pub mod simplifier;
 mod sum;

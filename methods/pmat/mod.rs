@@ -51,12 +51,12 @@
 #[cfg(test)]
 mod tests;
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::cmp::Ordering;
 use std::sync::Arc;
 
 use medial::complex::collapse::{Hierarchy, Step};
 use medial::complex::{MedialMesh, Sphere, ZERO_LENGTH};
+use medial::range_queue::RangeQueue;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
     Capability, Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, NoParams, RunContext,
@@ -202,11 +202,27 @@ const REPORT_EVERY: usize = 4096;
 const TASK: usize = 4096;
 
 /// An edge in the queue.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Candidate {
     key: Key,
     /// Ascending.
     ends: [u32; 2],
+}
+
+impl Ord for Candidate {
+    /// By key, then by ends; as one number, since a queue does little else than compare.
+    fn cmp(&self, other: &Self) -> Ordering {
+        let number = |c: &Self| {
+            u128::from(c.key.0) << 64 | u128::from(c.ends[0]) << 32 | u128::from(c.ends[1])
+        };
+        number(self).cmp(&number(other))
+    }
+}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
 }
 
 impl Candidate {
@@ -225,11 +241,14 @@ fn contract(mesh: &MedialMesh, run: &RunContext) -> Result<Vec<Step>> {
     let total = spheres.len();
     let edges = mesh.edges.par_iter().with_min_len(TASK);
     let candidate = |&ends: &[u32; 2]| Candidate::new(ends, ends.map(|v| spheres[v as usize]));
-    let mut queue = Queue::new(edges.map(candidate).collect());
+    let mut queue = RangeQueue::new(edges.map(candidate).collect());
     let mut graph = Graph::new(mesh);
     let mut steps = Vec::with_capacity(total);
     let mut left = Bits::ones(total);
-    while let Some(cheapest) = queue.pop(|ends| ends.iter().all(|&v| left.has(v))) {
+    let next = |queue: &mut RangeQueue<Candidate>, left: &Bits| {
+        queue.pop(|edge| edge.ends.iter().all(|&v| left.has(v)).then_some(edge))
+    };
+    while let Some(cheapest) = next(&mut queue, &left) {
         // Both ends are left, so their spheres, and with them the cost, are those of the queued edge.
         let [removed, kept] = absorbed_first(cheapest.ends, |v| graph.sphere(v).radius);
         let survivor = graph.sphere(kept);
@@ -244,74 +263,6 @@ fn contract(mesh: &MedialMesh, run: &RunContext) -> Result<Vec<Step>> {
     }
     run.step(total, total)?;
     Ok(steps)
-}
-
-/// Edges in the order of [`Candidate`]. Only the range of the lowest keys is a heap. The ranges above
-/// it are unsorted lists: most of their edges have lost an end before their turn, and a small heap
-/// stays in the cache.
-struct Queue {
-    lowest: BinaryHeap<Reverse<Candidate>>,
-    /// The least keys of the other ranges, descending.
-    from: Vec<Key>,
-    /// The edges of each.
-    ranges: Vec<Vec<Candidate>>,
-}
-
-/// Edges from which on a range is split before it becomes a heap.
-const LARGE_RANGE: usize = 4096;
-/// Most ranges made of one.
-const MAX_PIECES: usize = 4096;
-/// Keys that are sorted for each bound between two ranges.
-const KEYS_PER_BOUND: usize = 8;
-
-impl Queue {
-    fn new(candidates: Vec<Candidate>) -> Self {
-        Self { lowest: BinaryHeap::new(), from: vec![Key(0)], ranges: vec![candidates] }
-    }
-
-    #[inline]
-    fn push(&mut self, candidate: Candidate) {
-        let range = self.from.partition_point(|&from| from > candidate.key);
-        match self.ranges.get_mut(range) {
-            Some(range) => range.push(candidate),
-            None => self.lowest.push(Reverse(candidate)),
-        }
-    }
-
-    /// The first edge whose ends are left.
-    fn pop(&mut self, is_left: impl Fn([u32; 2]) -> bool) -> Option<Candidate> {
-        loop {
-            while let Some(Reverse(candidate)) = self.lowest.pop() {
-                if is_left(candidate.ends) {
-                    return Some(candidate);
-                }
-            }
-            let (from, mut range) = (self.from.pop()?, self.ranges.pop()?);
-            range.retain(|candidate| is_left(candidate.ends));
-            if range.len() >= LARGE_RANGE {
-                range = self.split(from, range);
-            }
-            self.lowest = range.into_iter().map(Reverse).collect();
-        }
-    }
-
-    /// Splits a range, and returns the lowest part of it.
-    fn split(&mut self, from: Key, range: Vec<Candidate>) -> Vec<Candidate> {
-        let pieces = (2 * range.len() / LARGE_RANGE).min(MAX_PIECES);
-        let step = range.len() / (pieces * KEYS_PER_BOUND);
-        let mut keys: Vec<Key> = range.iter().step_by(step).map(|c| c.key).collect();
-        keys.sort_unstable_by(|a, b| b.cmp(a));
-        keys.dedup();
-        let bounds = keys.into_iter().step_by(KEYS_PER_BOUND).filter(|&key| key > from);
-        self.from.extend(bounds);
-        self.ranges.resize_with(self.from.len(), Vec::new);
-        let mut lowest = Vec::new();
-        for candidate in range {
-            let at = self.from.partition_point(|&from| from > candidate.key);
-            self.ranges.get_mut(at).unwrap_or(&mut lowest).push(candidate);
-        }
-        lowest
-    }
 }
 
 /// A set of spheres, one bit each, so that it fits into the cache.

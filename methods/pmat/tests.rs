@@ -245,35 +245,3 @@ proptest! {
         }
     }
 }
-
-#[test]
-fn the_queue_has_the_order_of_one_heap() {
-    // A linear congruential sequence, in places with many equal keys.
-    let mut state = 1_u64;
-    let mut next = |equal: bool| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-        let end = (state >> 40) as u32;
-        super::Candidate { key: Key(if equal { 1 << 60 } else { state >> 8 }), ends: [end, end] }
-    };
-    let is_left = |[end, _]: [u32; 2]| !end.is_multiple_of(3);
-    let first: Vec<_> = (0..20_000).map(|k| next(k % 3 == 0)).collect();
-    let mut heap: BinaryHeap<_> = first.iter().copied().map(Reverse).collect();
-    let mut queue = Queue::new(first);
-    let mut popped = 0;
-    for k in 0.. {
-        let in_order = std::iter::from_fn(|| heap.pop()).map(|Reverse(candidate)| candidate);
-        let expected = { in_order }.find(|candidate| is_left(candidate.ends));
-        assert_eq!(queue.pop(is_left), expected);
-        if expected.is_none() {
-            break;
-        }
-        popped += 1;
-        if k < 5_000 {
-            for candidate in [next(k % 2 == 0), next(false), next(false)] {
-                heap.push(Reverse(candidate));
-                queue.push(candidate);
-            }
-        }
-    }
-    assert!(popped > 20_000, "{popped}");
-}

@@ -1,7 +1,6 @@
 //! Points on a surface: its vertices, area-uniform, or blue noise.
 
 use std::cmp::Ordering;
-use std::collections::BinaryHeap;
 use std::fmt;
 use std::str::FromStr;
 
@@ -12,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::mesh::{TriMesh, Unit};
 use crate::Vec3;
+use crate::range_queue::RangeQueue;
 use crate::sum::Sum;
 
 /// How a surface is sampled.
@@ -293,27 +293,27 @@ pub(super) fn eliminate(points: &[Vec3], normals: &[Vec3], area: f64, count: usi
     let share = count as f64 / points.len() as f64;
     let least = 2.0 * radius * (1.0 - share.powf(GAMMA)) * BETA;
     let mut weights: Vec<f64> = (0..points.len())
+        .into_par_iter()
         .map(|i| neighbours.of(i).iter().map(|&(_, d)| weight(d, least, reach)).sum())
         .collect();
-    let mut heap: BinaryHeap<Heaviest> =
-        (0..).zip(&weights).map(|(sample, &weight)| Heaviest { weight, sample }).collect();
-    let mut kept = vec![true; points.len()];
-    let mut left = points.len();
-    while left > count {
-        let Some(Heaviest { weight: recorded, sample }) = heap.pop() else { break };
-        let current = weights[sample as usize];
-        // Weights only fall, so an old entry is an upper bound: put it back at its present weight.
-        if recorded != current {
-            heap.push(Heaviest { weight: current, sample });
-            continue;
-        }
-        kept[sample as usize] = false;
-        left -= 1;
-        for &(other, distance) in neighbours.of(sample as usize) {
+    let heaviest = |((place, &sample), &weight)| Heaviest { weight, sample, place };
+    let samples = (0..).zip(&neighbours.samples).zip(&weights);
+    let mut queue = RangeQueue::new(samples.map(heaviest).collect());
+    let mut is_kept = vec![true; points.len()];
+    for _ in count..points.len() {
+        // Weights only fall.
+        let present =
+            |item: Heaviest| Some(Heaviest { weight: weights[item.place as usize], ..item });
+        let Some(Heaviest { place, .. }) = queue.pop(present) else { break };
+        is_kept[place as usize] = false;
+        for &(other, distance) in neighbours.of(place as usize) {
             weights[other as usize] -= weight(distance, least, reach);
         }
     }
-    (0..points.len() as u32).filter(|&i| kept[i as usize]).collect()
+    let samples = neighbours.samples.iter().zip(is_kept);
+    let mut kept: Vec<u32> = samples.filter(|&(_, kept)| kept).map(|(&sample, _)| sample).collect();
+    kept.par_sort_unstable();
+    kept
 }
 
 /// Step 2: the part of a sample's weight from another one at this distance.
@@ -321,15 +321,18 @@ fn weight(distance: f32, least: f64, reach: f64) -> f64 {
     (1.0 - f64::from(distance).max(least) / reach).max(0.0).powi(ALPHA)
 }
 
-/// An entry of the heap: largest weight first, then smallest index.
+/// An entry of the queue: largest weight first, then smallest index.
+#[derive(Clone, Copy)]
 struct Heaviest {
     weight: f64,
     sample: u32,
+    /// Its place among the neighbours.
+    place: u32,
 }
 
 impl Ord for Heaviest {
     fn cmp(&self, other: &Self) -> Ordering {
-        self.weight.total_cmp(&other.weight).then(other.sample.cmp(&self.sample))
+        other.weight.total_cmp(&self.weight).then(self.sample.cmp(&other.sample))
     }
 }
 
@@ -347,11 +350,17 @@ impl PartialEq for Heaviest {
 
 impl Eq for Heaviest {}
 
-/// For each sample the others near it and their distances.
+/// For each sample the others near it and their distances. Samples are numbered along cells of space, so that
+/// neighbours are close in memory.
 struct Neighbours {
+    /// The samples in this order.
+    samples: Vec<u32>,
     start: Vec<usize>,
     near: Vec<(u32, f32)>,
 }
+
+/// Samples whose neighbours one task finds.
+const TASK: usize = 4096;
 
 /// Cells along one axis; three indices fit 64 bits.
 const CELLS: f64 = (1 << 20) as f64;
@@ -371,35 +380,45 @@ impl Neighbours {
         let cell = |p: Vec3| ((p - lo) / size).to_array().map(|x| x as u64 + 1);
         let mut order: Vec<(u64, u32)> =
             (0..).zip(points).map(|(i, &p)| (key(cell(p)), i)).collect();
-        order.sort_unstable();
-        let lists: Vec<Vec<(u32, f32)>> = (0..points.len())
+        order.par_sort_unstable();
+        let places: Vec<_> =
+            order.iter().map(|&(_, i)| (points[i as usize], normals[i as usize])).collect();
+        let tasks: Vec<_> = (0..points.len()).step_by(TASK).collect();
+        let (lengths, near): (Vec<Vec<_>>, Vec<Vec<_>>) = tasks
             .into_par_iter()
-            .map(|i: usize| {
-                let [x, y, z] = cell(points[i]);
-                let mut near = Vec::new();
-                for (x, y) in (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| (x, y))) {
-                    // Keys of three cells along z are consecutive: one search instead of three.
-                    let (first, last) = (key([x, y, z - 1]), key([x, y, z + 1]));
-                    let from = order.partition_point(|&(k, _)| k < first);
-                    for &(_, j) in order[from..].iter().take_while(|&&(k, _)| k <= last) {
-                        let distance = points[i].distance(points[j as usize]);
-                        let faces_away = normals[i].dot(normals[j as usize]) < 0.0;
-                        if j as usize != i && distance < reach && !faces_away {
-                            near.push((j, distance as f32));
+            .map(|first: usize| {
+                let (mut lengths, mut near) = (Vec::with_capacity(TASK), Vec::new());
+                for i in first..places.len().min(first + TASK) {
+                    let (before, (p, normal)) = (near.len(), places[i]);
+                    let [x, y, z] = cell(p);
+                    for (x, y) in (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| (x, y)))
+                    {
+                        // Keys of three cells along z are consecutive: one search instead of three.
+                        let (low, high) = (key([x, y, z - 1]), key([x, y, z + 1]));
+                        let from = order.partition_point(|&(k, _)| k < low);
+                        let to = order[from..].iter().take_while(|&&(k, _)| k <= high).count();
+                        for (j, &(q, other)) in (from..).zip(&places[from..from + to]) {
+                            let distance = p.distance(q);
+                            if j != i && distance < reach && normal.dot(other) >= 0.0 {
+                                near.push((j as u32, distance as f32));
+                            }
                         }
                     }
+                    lengths.push(near.len() - before);
                 }
-                near
+                (lengths, near)
             })
-            .collect();
+            .unzip();
         let mut start = vec![0];
-        for list in &lists {
-            start.push(start[start.len() - 1] + list.len());
+        for length in lengths.concat() {
+            start.push(start[start.len() - 1] + length);
         }
-        Self { start, near: lists.concat() }
+        let near = near.concat();
+        Self { samples: order.into_iter().map(|(_, i)| i).collect(), start, near }
     }
 
-    fn of(&self, sample: usize) -> &[(u32, f32)] {
-        &self.near[self.start[sample]..self.start[sample + 1]]
+    /// The places of the neighbours of the sample at a place, and their distances.
+    fn of(&self, place: usize) -> &[(u32, f32)] {
+        &self.near[self.start[place]..self.start[place + 1]]
     }
 }

@@ -1,0 +1,164 @@
+//! A priority queue for many items of which most change or vanish before their turn.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// Items in ascending order. Only those of the lowest range are a heap, which is small enough for the cache.
+/// The ranges above it are unsorted lists: outdated items are dropped or moved when the turn of their range
+/// comes, and most never enter a heap.
+///
+/// ```
+/// use medial::range_queue::RangeQueue;
+///
+/// // Of these items 5 is gone, and 7 has become 8.
+/// let mut queue = RangeQueue::new(vec![7, 5, 9, 1]);
+/// let present = |item| (item != 5).then_some(if item == 7 { 8 } else { item });
+/// let order: Vec<i32> = std::iter::from_fn(|| queue.pop(present)).collect();
+/// assert_eq!(order, [1, 8, 9]);
+/// ```
+#[derive(Clone, Debug)]
+pub struct RangeQueue<T> {
+    lowest: BinaryHeap<Reverse<T>>,
+    /// The least items of the ranges above, descending.
+    from: Vec<T>,
+    /// The items of each of them.
+    ranges: Vec<Vec<T>>,
+}
+
+/// Items from which on a range is split before it becomes a heap.
+const LARGE: usize = 4096;
+/// Most ranges made of one.
+const MAX_PIECES: usize = 4096;
+/// Items that are sorted for each bound between two ranges.
+const PER_BOUND: usize = 8;
+
+impl<T: Ord + Copy> RangeQueue<T> {
+    /// A queue of some items.
+    pub fn new(items: Vec<T>) -> Self {
+        let mut queue = Self { lowest: BinaryHeap::new(), from: Vec::new(), ranges: Vec::new() };
+        queue.fill(items);
+        queue
+    }
+
+    /// Adds an item.
+    #[inline]
+    pub fn push(&mut self, item: T) {
+        match self.range_of(item) {
+            Some(range) => self.ranges[range].push(item),
+            None => self.lowest.push(Reverse(item)),
+        }
+    }
+
+    /// Removes the least item that is up to date. `present` gives for an item what it has become: the same, a
+    /// larger one, or nothing.
+    pub fn pop(&mut self, present: impl Fn(T) -> Option<T>) -> Option<T> {
+        loop {
+            while let Some(Reverse(item)) = self.lowest.pop() {
+                match present(item) {
+                    Some(now) if now == item => return Some(item),
+                    Some(now) => self.push(now),
+                    None => {}
+                }
+            }
+            let range = self.ranges.pop()?;
+            self.from.pop();
+            let mut lowest: Vec<T> = Vec::with_capacity(range.len());
+            for item in range.into_iter().filter_map(&present) {
+                match self.range_of(item) {
+                    Some(range) => self.ranges[range].push(item),
+                    None => lowest.push(item),
+                }
+            }
+            self.fill(lowest);
+        }
+    }
+
+    /// Makes a heap of a range that is the lowest one now, or of the lowest part of it.
+    fn fill(&mut self, range: Vec<T>) {
+        let lowest = if range.len() < LARGE { range } else { self.split(range) };
+        self.lowest = lowest.into_iter().map(Reverse).collect();
+    }
+
+    /// The range above the lowest one that an item belongs to.
+    #[inline]
+    fn range_of(&self, item: T) -> Option<usize> {
+        let range = self.from.partition_point(|&from| from > item);
+        (range < self.from.len()).then_some(range)
+    }
+
+    /// Splits a range into several, and returns the lowest.
+    fn split(&mut self, range: Vec<T>) -> Vec<T> {
+        let pieces = (2 * range.len() / LARGE).min(MAX_PIECES);
+        let step = range.len() / (pieces * PER_BOUND);
+        let mut some: Vec<T> = range.iter().copied().step_by(step).collect();
+        some.sort_unstable_by(|a, b| b.cmp(a));
+        some.dedup();
+        // The lowest range keeps the least item, so that it is not empty.
+        let least = range.iter().min().copied();
+        self.from.extend(some.into_iter().step_by(PER_BOUND).filter(|&item| Some(item) > least));
+        self.ranges.resize_with(self.from.len(), Vec::new);
+        let mut lowest = Vec::new();
+        for item in range {
+            match self.range_of(item) {
+                Some(range) => self.ranges[range].push(item),
+                None => lowest.push(item),
+            }
+        }
+        lowest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_order_is_that_of_one_heap() {
+        // A linear congruential sequence, in places with many equal items.
+        let mut state = 1_u64;
+        let mut next = |equal: bool| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (if equal { 1 << 60 } else { state >> 8 }, (state >> 40) as u32)
+        };
+        // Some items vanish, others grow once.
+        let present = |(key, id): (u64, u32)| match id % 5 {
+            0 => None,
+            1 if key.is_multiple_of(2) => Some((key + 1001, id)),
+            _ => Some((key, id)),
+        };
+        let first: Vec<_> = (0..20_000).map(|k| next(k % 3 == 0)).collect();
+        let mut heap: BinaryHeap<_> = first.iter().copied().map(Reverse).collect();
+        let mut queue = RangeQueue::new(first);
+        let mut popped = 0;
+        for k in 0.. {
+            let expected = loop {
+                let Some(Reverse(item)) = heap.pop() else { break None };
+                match present(item) {
+                    Some(now) if now == item => break Some(item),
+                    Some(now) => heap.push(Reverse(now)),
+                    None => {}
+                }
+            };
+            assert_eq!(queue.pop(present), expected);
+            if expected.is_none() {
+                break;
+            }
+            popped += 1;
+            if k < 5_000 {
+                for item in [next(k % 2 == 0), next(false), next(false)] {
+                    heap.push(Reverse(item));
+                    queue.push(item);
+                }
+            }
+        }
+        assert!(popped > 20_000, "{popped}");
+    }
+
+    #[test]
+    fn equal_items_all_come() {
+        let mut queue = RangeQueue::new(vec![7; 3 * LARGE]);
+        queue.push(3);
+        assert_eq!(queue.pop(Some), Some(3));
+        assert_eq!(std::iter::from_fn(|| queue.pop(Some)).count(), 3 * LARGE);
+    }
+}
