@@ -188,16 +188,27 @@ impl WeightRange {
 /// in the last place; `None` if the points are coplanar.
 pub(super) fn orthocentre(p: [(&[f64; 3], f64); 4]) -> Option<[f64; 3]> {
     let weights = p.map(|q| q.1);
-    let cap = WeightRange::of(&weights).quantum_cap();
-    let (d, quantum) = differences([p[1].0, p[2].0, p[3].0], p[0].0, cap);
-    let [first, others @ ..] = weights;
-    let offset = offsets(first, others, 2 * quantum);
-    // Always the widest tier: this runs only where double precision is not trusted.
-    orthocentre_wide::<20, 40, 60, 80>(&d.into_wide(), &offset, quantum)
+    let range = WeightRange::of(&weights);
+    let (d, quantum) = differences([p[1].0, p[2].0, p[3].0], p[0].0, range.quantum_cap());
+    let ([first, others @ ..], unit) = (weights, 2 * quantum);
+    // Samples of plane faces have many nearly flat cells, so that narrow tiers matter. The limits are those of
+    // `power_test`.
+    match d {
+        Differences::One(d) if range.fits(122, unit) => {
+            cramer::<1, 2, 3, 4>(&widen(&d), &offsets(first, others, unit), quantum)
+        }
+        Differences::One(d) if range.fits(250, unit) => {
+            cramer::<2, 4, 6, 8>(&widen(&d), &offsets(first, others, unit), quantum)
+        }
+        Differences::Two(d) if range.fits(250, unit) => {
+            cramer::<2, 4, 6, 8>(&widen(&d), &offsets(first, others, unit), quantum)
+        }
+        d => cramer::<20, 40, 60, 80>(&d.into_wide(), &offsets(first, others, unit), quantum),
+    }
 }
 
 /// Cramer's rule for `2 d_i . c = |d_i|^2 + offset_i` with exact numerators and denominator.
-fn orthocentre_wide<const D: usize, const D2: usize, const D3: usize, const D4: usize>(
+fn cramer<const D: usize, const D2: usize, const D3: usize, const D4: usize>(
     d: &[[Wide<D>; 3]; 3],
     offset: &[Wide<D2>; 3],
     quantum: i32,
@@ -567,6 +578,22 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2_000))]
+
+        #[test]
+        fn orthocentres_of_all_tiers_agree(
+            mut p in points(), shift in prop_oneof![Just(0.0), -1e-9..1e-9, -1e9..1e9],
+            w in prop::array::uniform4(prop_oneof![Just(0.0), -1.0..1.0, -1e-30..1e-30]),
+        ) {
+            // With more bits, and nearly coplanar.
+            p.iter_mut().for_each(|p| p[0] += shift);
+            p[3][2] = p[0][2] + shift * p[3][1];
+            let [sites @ .., _] = p.each_ref();
+            let cap = WeightRange::of(&w).quantum_cap();
+            let (d, quantum) = differences([sites[1], sites[2], sites[3]], sites[0], cap);
+            let offset = offsets(w[0], [w[1], w[2], w[3]], 2 * quantum);
+            let widest = cramer::<20, 40, 60, 80>(&d.into_wide(), &offset, quantum);
+            prop_assert_eq!(orthocentre([0, 1, 2, 3].map(|i| (sites[i], w[i]))), widest);
+        }
 
         #[test]
         fn scaled_axes_agree_with_the_widest_tier(
