@@ -94,16 +94,15 @@ impl Progress {
     }
 }
 
+/// Usual seconds of a method from elsewhere: about the mean of ours.
+const ELSEWHERE: f64 = 5.0;
+
 /// Seconds of the turns ahead: for each the mean of its method so far, or what it usually takes in proportion to the
 /// methods so far. `None` before the first turn is done.
 fn estimate(seen: &[(String, f64)], ahead: &[String]) -> Option<f64> {
-    let sum = |of: &dyn Fn(&str) -> f64| seen.iter().map(|(method, _)| of(method)).sum::<f64>();
     let seconds: f64 = seen.iter().map(|(_, seconds)| seconds).sum();
-    // Methods from elsewhere count as the mean of those so far.
-    let mean = sum(&|id| usual_seconds(id).unwrap_or(0.0))
-        / sum(&|id| f64::from(usual_seconds(id).is_some()));
-    let usual = |id: &str| usual_seconds(id).unwrap_or(if mean > 0.0 { mean } else { 1.0 });
-    let slowness = seconds / sum(&usual);
+    let usual = |id: &str| usual_seconds(id).unwrap_or(ELSEWHERE);
+    let slowness = seconds / seen.iter().map(|(method, _)| usual(method)).sum::<f64>();
     let turn = |method: &String| {
         let own = seen.iter().filter(|(id, _)| id == method).map(|(_, seconds)| *seconds);
         let (number, sum) = own.fold((0.0, 0.0), |(number, sum), s| (number + 1.0, sum + s));

@@ -163,7 +163,8 @@ impl Score {
 /// taken once; of equal scores the first wins.
 ///
 /// # Cost
-/// `O(n)` for each step, with `n` candidates, and `O(n m / 64)` once, with `m` samples.
+/// `O(n)` for each step, with `n` candidates, and for all steps together one for each candidate and
+/// sample that it covers.
 pub(super) fn choose(
     spheres: &[Sphere],
     coverage: &Coverage,
@@ -189,7 +190,7 @@ pub(super) fn choose(
         let centre = spheres[best].centre;
         for (nearest, ball) in nearest.iter_mut().zip(spheres) {
             let squared = ball.centre.distance_squared(centre);
-            // Rarely, so that few roots are taken.
+            // Seldom, so that few roots are taken.
             if squared < *nearest * *nearest {
                 *nearest = nearest.min(squared.sqrt());
             }

@@ -82,7 +82,7 @@ pub struct CoverageAxis {
 
 /// Coverage Axis and Coverage Axis++ as a method, with the collapse for `connection=qmat`.
 ///
-/// Supports all levels but an error bound. Memory: one bit for each candidate and sample.
+/// Supports all levels but an error bound. Memory: two bits for each candidate and sample.
 pub fn method(keeping: Keeping) -> CoverageAxis {
     let info = MethodInfo::new("coverage-axis", "Coverage Axis++")
         .seeded()

@@ -245,10 +245,9 @@ fn contract(mesh: &MedialMesh, run: &RunContext) -> Result<Vec<Step>> {
     let mut graph = Graph::new(mesh);
     let mut steps = Vec::with_capacity(total);
     let mut left = Bits::ones(total);
-    let next = |queue: &mut RangeQueue<Candidate>, left: &Bits| {
+    while let Some(cheapest) =
         queue.pop(|edge| edge.ends.iter().all(|&v| left.has(v)).then_some(edge))
-    };
-    while let Some(cheapest) = next(&mut queue, &left) {
+    {
         // Both ends are left, so their spheres, and with them the cost, are those of the queued edge.
         let [removed, kept] = absorbed_first(cheapest.ends, |v| graph.sphere(v).radius);
         let survivor = graph.sphere(kept);

@@ -387,13 +387,16 @@ struct Tangents {
     places: [u32; 4],
 }
 
-/// Bound on the error of a tangent in single precision, per unit of distance and radius: five
-/// roundings.
-const TANGENT_BLUR: f64 = 1e-6;
+/// Bound on the error of a tangent in single precision, per unit of distance and radius: ten
+/// roundings of numbers up to three times as large.
+const TANGENT_BLUR: f64 = 2e-6;
 
 impl<'a> Vicinity<'a> {
-    /// The closest point to a point of the ball. A face `start` near to it speeds up the search; the
-    /// result does not depend on it.
+    /// The closest point to a point of the ball; of any other point one that may be farther. A face
+    /// `start` near to it speeds up the search; the result does not depend on it.
+    ///
+    /// # Panics
+    /// If `start` is not a face.
     pub fn closest_from(&self, p: Vec3, start: u32) -> Closest {
         let place = self.bvh.places[start as usize];
         let found = self.nearest(Nearest::starting(self.bvh, p, place as usize));
@@ -409,13 +412,16 @@ impl<'a> Vicinity<'a> {
         (found.place != NONE).then(|| self.bvh.describe(p, found.place, found.squared))
     }
 
-    /// That of a ball inside this one, which has the closest face `start`.
+    /// That of a ball inside this one, whose centre is near the face `start`.
+    ///
+    /// # Panics
+    /// If `start` is not a face.
     pub fn narrowed(&self, centre: Vec3, radius: f64, start: u32) -> Option<Self> {
         let foot = self.closest_from(centre, start);
         let mut search = Collect::new(self.bvh, centre, radius, &foot);
-        let limit = self.limit(search.reach);
+        let (offset, limit) = (self.offset(centre), self.limit(search.reach));
         for tangents in &self.tangents {
-            tangents.each_within(&self.offset(centre), limit, |place| search.add(place));
+            tangents.each_within(&offset, limit, |place| search.add(place));
         }
         search.finish()
     }
