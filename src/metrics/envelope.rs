@@ -26,7 +26,9 @@
 //!   removes has almost no area.
 
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
+use glam::DMat3;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
@@ -34,7 +36,7 @@ use rayon::prelude::*;
 use super::MetricError;
 use super::samples::Pose;
 use crate::Vec3;
-use crate::complex::{MedialMesh, MedialUnion};
+use crate::complex::{Incidence, MedialMesh, MedialUnion};
 use crate::geometry::hash::splitmix;
 use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
 
@@ -64,6 +66,12 @@ const USUAL_CANDIDATES: f64 = 10.0;
 const MIN_SHARE: f64 = 0.25;
 /// But never more candidates per requested sample than this.
 const MAX_CANDIDATES: f64 = 200.0;
+
+/// A cell of a patch has about this many candidates.
+const CELL: usize = 8;
+/// Share of the union's diagonal, more than distances are rounded by, so that each point of a buried
+/// cell would be found to be buried.
+const MARGIN: f64 = 1e-10;
 
 /// The golden ratio's fractional part, and the two of the plastic number: steps of the sequences.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -159,6 +167,8 @@ struct Patch {
     kind: u64,
     /// The cells of its spheres, in ascending order; zero where it has fewer.
     cells: [[u64; 2]; 3],
+    /// Other ends of the edges of a sphere; third spheres of the faces of a cone.
+    beside: Vec<Sphere>,
 }
 
 /// The patches of a mesh, in an order that neither the numbering nor rounding changes.
@@ -167,11 +177,28 @@ fn patches(mesh: &MedialMesh, pose: &Pose) -> Vec<Patch> {
     let of = |corners: &[u32]| {
         std::array::from_fn(|k| corners.get(k).map_or([0; 2], |&v| cells[v as usize]))
     };
+    let mut at_spheres = vec![vec![]; mesh.spheres.len()];
+    for &[a, b] in &mesh.edges {
+        at_spheres[a as usize].push(mesh.spheres[b as usize]);
+        at_spheres[b as usize].push(mesh.spheres[a as usize]);
+    }
+    let mut at_edges = vec![vec![]; mesh.edges.len()];
+    for (&[a, b, c], edges) in mesh.faces.iter().zip(Incidence::of(mesh).face_edges()) {
+        for (edge, third) in edges.iter().zip([c, b, a]) {
+            at_edges[*edge as usize].push(mesh.spheres[third as usize]);
+        }
+    }
     let mut patches: Vec<Patch> = (0..)
         .zip(&mesh.spheres)
-        .map(|(v, &m)| Patch { surface: Surface::Sphere(m), kind: 0, cells: of(&[v]) })
+        .zip(at_spheres)
+        .map(|((v, &m), beside)| Patch {
+            surface: Surface::Sphere(m),
+            kind: 0,
+            cells: of(&[v]),
+            beside,
+        })
         .collect();
-    for &(mut ends) in &mesh.edges {
+    for (&(mut ends), beside) in mesh.edges.iter().zip(at_edges) {
         ends.sort_by_key(|&v| cells[v as usize]);
         let [a, b] = mesh.spheres_of(ends);
         if let Some(frame) = Cone::new(a, b).frame() {
@@ -179,6 +206,7 @@ fn patches(mesh: &MedialMesh, pose: &Pose) -> Vec<Patch> {
                 surface: Surface::Lateral(a, b, frame),
                 kind: 1,
                 cells: of(&ends),
+                beside,
             });
         }
     }
@@ -188,7 +216,8 @@ fn patches(mesh: &MedialMesh, pose: &Pose) -> Vec<Patch> {
         if let Some(planes) = Slab::new(balls).planes() {
             for (normal, kind) in planes.normals().into_iter().zip(2..) {
                 let surface = Surface::Triangle(balls.map(|m| m.centre + m.radius * normal));
-                patches.push(Patch { surface, kind, cells: of(&corners) });
+                let cells = of(&corners);
+                patches.push(Patch { surface, kind, cells, beside: Vec::new() });
             }
         }
     }
@@ -222,18 +251,13 @@ fn sample_patches(
             (expected.floor() - before) as usize
         })
         .collect();
+    let (low, high) = union.bounding_box();
+    let depth = options.burial + MARGIN * low.distance(high);
     let samples = patches.par_iter().zip(&counts).flat_map_iter(|(patch, &count)| {
-        let mut points = Vec::new();
-        if count > 0 {
-            let mut rng = Pcg64::seed_from_u64(options.seed ^ patch.stream());
-            patch.surface.sample(axes, count, &mut rng, &mut points);
-            // Most buried points are found by the first primitive that is tried.
-            union.retain_unburied(&mut points, options.burial);
-        }
-        let mut near = 0;
-        points.into_iter().filter_map(move |point| {
-            let depth = -union.signed_from(point, &mut near);
-            let weight = (2.0 * (1.0 - depth / options.burial)).min(1.0);
+        let mut rng = Pcg64::seed_from_u64(options.seed ^ patch.stream());
+        let points = patch.surface.sample(axes, count, &mut rng, &patch.beside, depth);
+        union.unburied(points, options.burial).into_iter().filter_map(|(point, signed)| {
+            let weight = (2.0 * (1.0 + signed / options.burial)).min(1.0);
             // Without a burial depth only points in no primitive at all are on the boundary.
             let weight = if options.burial > 0.0 { weight } else { 1.0 };
             (weight > 0.0).then_some((point, weight))
@@ -255,42 +279,173 @@ impl Surface {
         }
     }
 
-    fn sample(&self, axes: [Vec3; 3], count: usize, rng: &mut Pcg64, points: &mut Vec<Vec3>) {
+    /// Of `count` points the unburied ones, and some buried ones.
+    fn sample(
+        &self,
+        axes: [Vec3; 3],
+        count: usize,
+        rng: &mut Pcg64,
+        beside: &[Sphere],
+        depth: f64,
+    ) -> Vec<Vec3> {
         let shift = [rng.random::<f64>(), rng.random::<f64>()];
-        let level = |i: usize| (i as f64 + 0.5) / count as f64;
-        match self {
-            Self::Sphere(m) => {
-                let turn = glam::DMat3::from_cols_array_2d(&axes.map(|axis| axis.to_array()))
-                    * glam::DMat3::from_quat(random_rotation(rng));
-                points.extend((0..count).map(|i| {
-                    let z = 1.0 - 2.0 * level(i);
-                    let (sin, cos) = (TAU * (i as f64 * GOLDEN).fract()).sin_cos();
-                    let rho = ((1.0 - z) * (1.0 + z)).sqrt();
-                    m.centre + m.radius * (turn * Vec3::new(rho * cos, rho * sin, z))
-                }));
+        let turn = match self {
+            Self::Sphere(_) => {
+                DMat3::from_cols_array_2d(&axes.map(|axis| axis.to_array()))
+                    * DMat3::from_quat(random_rotation(rng))
             }
-            Self::Lateral(a, b, frame) => {
+            Self::Lateral(_, _, frame) => {
                 let v = across(frame, axes);
-                let w = frame.u.cross(v);
-                points.extend((0..count).map(|i| {
-                    let share = (level(i) + shift[0]).fract();
-                    let (sin, cos) = (TAU * (i as f64 * GOLDEN + shift[1]).fract()).sin_cos();
-                    // Area grows with the radius; this form does not cancel for equal radii.
-                    let sum = a.radius + b.radius;
-                    let radius = (a.radius * a.radius + share * (b.radius - a.radius) * sum).sqrt();
-                    let m = a.lerp(*b, share * sum / (a.radius + radius));
-                    m.centre + m.radius * frame.normal(cos * v + sin * w)
-                }));
+                DMat3::from_cols(v, frame.u.cross(v), frame.u)
             }
-            Self::Triangle([a, b, c]) => points.extend((0..count).map(|i| {
-                let [mut s, mut t] = [0, 1].map(|k| (i as f64 * PLASTIC[k] + shift[k]).fract());
+            Self::Triangle(_) => DMat3::IDENTITY,
+        };
+        let mut grid = Grid::new(if beside.is_empty() { 0 } else { count }, self.lengths());
+        let all = [0..grid.sides[0], 0..grid.sides[1]];
+        grid.bury(all, &|cell| self.is_buried(&turn, cell, beside, depth));
+        let level = |i: usize| (i as f64 + 0.5) / count as f64;
+        let places = (0..count).map(|i| match self {
+            Self::Sphere(_) => [level(i), (i as f64 * GOLDEN).fract()],
+            Self::Lateral(..) => {
+                [(level(i) + shift[0]).fract(), (i as f64 * GOLDEN + shift[1]).fract()]
+            }
+            Self::Triangle(_) => {
+                let [s, t] = [0, 1].map(|k| (i as f64 * PLASTIC[k] + shift[k]).fract());
                 // The sequence fills a parallelogram; its other half is reflected into the triangle.
-                if s + t > 1.0 {
-                    (s, t) = (1.0 - s, 1.0 - t);
-                }
-                *a + s * (*b - *a) + t * (*c - *a)
-            })),
+                if s + t > 1.0 { [1.0 - s, 1.0 - t] } else { [s, t] }
+            }
+        });
+        places.filter(|&place| !grid.is_buried(place)).map(|place| self.at(&turn, place)).collect()
+    }
+
+    /// The point at two coordinates from 0 to 1, of which equal areas of the square have equal areas of
+    /// the surface.
+    fn at(&self, turn: &DMat3, [s, t]: [f64; 2]) -> Vec3 {
+        match self {
+            Self::Sphere(m) => m.centre + m.radius * self.normal(turn, [s, t]),
+            Self::Lateral(a, b, _) => {
+                // Area grows with the radius; this form does not cancel for equal radii.
+                let sum = a.radius + b.radius;
+                let radius = (a.radius * a.radius + s * (b.radius - a.radius) * sum).sqrt();
+                let m = a.lerp(*b, s * sum / (a.radius + radius));
+                m.centre + m.radius * self.normal(turn, [s, t])
+            }
+            Self::Triangle([a, b, c]) => *a + s * (*b - *a) + t * (*c - *a),
         }
+    }
+
+    /// The normal there, of a sphere or cone.
+    fn normal(&self, turn: &DMat3, [s, t]: [f64; 2]) -> Vec3 {
+        let (sin, cos) = (TAU * t).sin_cos();
+        match self {
+            Self::Sphere(_) => {
+                let z = 1.0 - 2.0 * s;
+                let rho = ((1.0 - z) * (1.0 + z)).sqrt();
+                *turn * Vec3::new(rho * cos, rho * sin, z)
+            }
+            Self::Lateral(_, _, frame) => frame.normal(cos * turn.x_axis + sin * turn.y_axis),
+            Self::Triangle(_) => Vec3::ZERO,
+        }
+    }
+
+    /// Lengths along the coordinates, relative to each other, of cells that share a normal.
+    fn lengths(&self) -> [f64; 2] {
+        match self {
+            Self::Sphere(_) => [PI, TAU],
+            Self::Lateral(..) => [0.0, TAU],
+            Self::Triangle(_) => [0.0; 2],
+        }
+    }
+
+    /// Whether a ball of the cones or slabs between this sphere or cone and some others holds all
+    /// points of a cell deeper than a limit.
+    fn is_buried(
+        &self,
+        turn: &DMat3,
+        [[s0, s1], [t0, t1]]: [[f64; 2]; 2],
+        beside: &[Sphere],
+        depth: f64,
+    ) -> bool {
+        let (s, t) = ((s0 + s1) / 2.0, (t0 + t1) / 2.0);
+        // A bound on the angles of the normals to that in the middle.
+        let ([a, b], angle) = match self {
+            // Along the meridian to the middle, and from there along the circle.
+            Self::Sphere(m) => {
+                let [low, middle, high] = [s0, s, s1].map(|s| (1.0 - 2.0 * s).acos());
+                let along = (middle - low).max(high - middle);
+                ([m, m], along + PI * (t1 - t0) * middle.sin())
+            }
+            Self::Lateral(a, b, _) => ([a, b], PI * (t1 - t0)),
+            Self::Triangle(_) => return false,
+        };
+        let normal = self.normal(turn, [s, t]);
+        let radius = a.radius.min(b.radius);
+        beside.iter().any(|c| {
+            // On the way from the ball m of this surface to c, in steps k from 0 to 1, the depth of a
+            // point with normal n in the ball grows by at least k * rise - k^2 |c - m|^2 / (2 r_m), with
+            // rise = n * (c - m) + r_c - r_m. Along the line of a cone with this normal the rise is the same.
+            let to = c.centre - a.centre;
+            let up = normal.dot(to);
+            let aside = (to - up * normal).length();
+            let rise = up + c.radius - a.radius - angle * (aside + angle * up.abs() / 2.0);
+            let square = to.length_squared().max((c.centre - b.centre).length_squared());
+            let k = (rise * radius / square).min(1.0);
+            rise > 0.0 && k * rise - k * k * square / (2.0 * radius) > depth
+        })
+    }
+}
+
+/// Cells of a patch, of which some lie as a whole inside another primitive: their points need not be
+/// made.
+struct Grid {
+    sides: [usize; 2],
+    /// Length of a cell along each coordinate.
+    lengths: [f64; 2],
+    buried: Vec<bool>,
+}
+
+impl Grid {
+    /// Cells as square as possible.
+    fn new(count: usize, mut lengths: [f64; 2]) -> Self {
+        let mut sides = [1; 2];
+        while sides[0] * sides[1] * CELL < count {
+            let longer = usize::from(lengths[1] > lengths[0]);
+            sides[longer] *= 2;
+            lengths[longer] /= 2.0;
+        }
+        Self { sides, lengths, buried: vec![false; sides[0] * sides[1]] }
+    }
+
+    /// Marks the cells of a rectangle that are buried, from coarse to fine.
+    fn bury(&mut self, cells: [Range<usize>; 2], is_buried: &impl Fn([[f64; 2]; 2]) -> bool) {
+        let [rows, columns] = &cells;
+        let place = |range: &Range<usize>, side: usize| {
+            [range.start, range.end].map(|end| end as f64 / side as f64)
+        };
+        if is_buried([place(rows, self.sides[0]), place(columns, self.sides[1])]) {
+            for row in rows.clone() {
+                let start = row * self.sides[1];
+                self.buried[start + columns.start..start + columns.end].fill(true);
+            }
+            return;
+        }
+        if rows.len() == 1 && columns.len() == 1 {
+            return;
+        }
+        let [high, wide] = [0, 1].map(|k| cells[k].len() as f64 * self.lengths[k]);
+        let split = usize::from(rows.len() == 1 || (columns.len() > 1 && wide > high));
+        let Range { start, end } = cells[split];
+        for half in [start..(start + end) / 2, (start + end) / 2..end] {
+            let mut cells = cells.clone();
+            cells[split] = half;
+            self.bury(cells, is_buried);
+        }
+    }
+
+    fn is_buried(&self, place: [f64; 2]) -> bool {
+        let [row, column] =
+            [0, 1].map(|k| ((place[k] * self.sides[k] as f64) as usize).min(self.sides[k] - 1));
+        self.buried[row * self.sides[1] + column]
     }
 }
 

@@ -205,10 +205,11 @@ fn union_distances_match_brute_force() {
         let (signed, nearest) =
             (union.signed_batch(&queries), union.unsigned_nearest_batch(&queries));
         let readings = union.readings_batch(&queries);
-        let mut unburied = queries.clone();
-        union.retain_unburied(&mut unburied, 1e-3);
-        let one_by_one: Vec<Vec3> =
-            queries.iter().copied().filter(|&p| !union.buries(p, 1e-3)).collect();
+        let unburied = union.unburied(queries.clone(), 1e-3);
+        let one_by_one: Vec<(Vec3, f64)> = std::iter::zip(&queries, &signed)
+            .map(|(&p, &s)| (p, s))
+            .filter(|q| q.1 >= -1e-3)
+            .collect();
         assert_eq!(unburied, one_by_one);
         for (k, &p) in queries.iter().enumerate() {
             let all = all_signed(&mesh, p);

@@ -341,25 +341,30 @@ impl MedialUnion {
         self.parts.any_below(p, -depth).is_some()
     }
 
-    /// Removes the points that some primitive [`buries`](Self::buries) deeper than `depth`. Fast if few
-    /// primitives bury most points, as on the surface of another primitive.
-    pub fn retain_unburied(&self, points: &mut Vec<Vec3>, depth: f64) {
+    /// The points that no primitive [`buries`](Self::buries) deeper than `depth`, in their order, with
+    /// their [`signed`](Self::signed) distances. Fast if few primitives bury most points, as on the
+    /// surface of another primitive.
+    pub fn unburied(&self, points: Vec<Vec3>, depth: f64) -> Vec<(Vec3, f64)> {
         // Primitives that buried a point are tried first, the most recent one before the others.
         let mut recent = [None; RECENT];
-        points.retain(|&p| {
+        let mut near = 0;
+        let signed = |&p: &Vec3| {
             let again = recent.iter().position(|place: &Option<usize>| {
                 place.is_some_and(|place| self.parts.shape(place).signed(p) < -depth)
             });
-            let burier = match again {
-                Some(turn) => recent[turn],
-                None => self.parts.any_below(p, -depth),
+            let signed = match again {
+                Some(_) => None,
+                None => Some(self.signed_from(p, &mut near)).filter(|&signed| signed >= -depth),
             };
-            if burier.is_some() {
+            if signed.is_none() {
+                let burier = again.map_or(Some(near), |turn| recent[turn]);
                 recent[..=again.unwrap_or(RECENT - 1)].rotate_right(1);
                 recent[0] = burier;
             }
-            burier.is_none()
-        });
+            signed
+        };
+        let signed: Vec<_> = points.iter().map(signed).collect();
+        points.into_iter().zip(signed).filter_map(|(p, signed)| Some((p, signed?))).collect()
     }
 
     /// Calls `each` for all primitives nearer to `p` than `limit` by signed distance, with that
