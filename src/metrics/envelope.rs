@@ -69,6 +69,8 @@ const MAX_CANDIDATES: f64 = 200.0;
 
 /// A cell of a patch has about this many candidates.
 const CELL: usize = 8;
+/// Patches, near to each other, whose points are searched one after the other.
+const RUN: usize = 16;
 /// Share of the union's diagonal, more than distances are rounded by, so that each point of a buried
 /// cell would be found to be buried.
 const MARGIN: f64 = 1e-10;
@@ -253,9 +255,13 @@ fn sample_patches(
         .collect();
     let (low, high) = union.bounding_box();
     let depth = options.burial + MARGIN * low.distance(high);
-    let samples = patches.par_iter().zip(&counts).flat_map_iter(|(patch, &count)| {
-        let mut rng = Pcg64::seed_from_u64(options.seed ^ patch.stream());
-        let points = patch.surface.sample(axes, count, &mut rng, &patch.beside, depth);
+    let runs = patches.par_chunks(RUN).zip(counts.par_chunks(RUN));
+    let samples = runs.flat_map_iter(|(patches, counts)| {
+        let points = patches.iter().zip(counts).flat_map(|(patch, &count)| {
+            let mut rng = Pcg64::seed_from_u64(options.seed ^ patch.stream());
+            patch.surface.sample(axes, count, &mut rng, &patch.beside, depth)
+        });
+        let points = points.collect();
         union.unburied(points, options.burial).into_iter().filter_map(|(point, signed)| {
             let weight = (2.0 * (1.0 + signed / options.burial)).min(1.0);
             // Without a burial depth only points in no primitive at all are on the boundary.
@@ -302,7 +308,10 @@ impl Surface {
         };
         let mut grid = Grid::new(if beside.is_empty() { 0 } else { count }, self.lengths());
         let all = [0..grid.sides[0], 0..grid.sides[1]];
-        grid.bury(all, &|cell| self.is_buried(&turn, cell, beside, depth));
+        grid.bury(all, &|cell| {
+            let (normal, angle) = self.normals(&turn, cell);
+            self.is_buried(normal, angle, beside, depth)
+        });
         let level = |i: usize| (i as f64 + 0.5) / count as f64;
         let places = (0..count).map(|i| match self {
             Self::Sphere(_) => [level(i), (i as f64 * GOLDEN).fract()],
@@ -315,37 +324,40 @@ impl Surface {
                 if s + t > 1.0 { [1.0 - s, 1.0 - t] } else { [s, t] }
             }
         });
-        places.filter(|&place| !grid.is_buried(place)).map(|place| self.at(&turn, place)).collect()
+        let places = places.filter(|&place| !grid.is_buried(place));
+        let points = places.map(|place| (place, self.normal(&turn, place)));
+        let points = points.filter(|&(_, normal)| !self.is_buried(normal, 0.0, beside, depth));
+        points.map(|(place, normal)| self.at(place, normal)).collect()
     }
 
     /// The point at two coordinates from 0 to 1, of which equal areas of the square have equal areas of
-    /// the surface.
-    fn at(&self, turn: &DMat3, [s, t]: [f64; 2]) -> Vec3 {
+    /// the surface. A sphere and a cone need the normal there.
+    fn at(&self, [s, t]: [f64; 2], normal: Vec3) -> Vec3 {
         match self {
-            Self::Sphere(m) => m.centre + m.radius * self.normal(turn, [s, t]),
+            Self::Sphere(m) => m.centre + m.radius * normal,
             Self::Lateral(a, b, _) => {
                 // Area grows with the radius; this form does not cancel for equal radii.
                 let sum = a.radius + b.radius;
                 let radius = (a.radius * a.radius + s * (b.radius - a.radius) * sum).sqrt();
                 let m = a.lerp(*b, s * sum / (a.radius + radius));
-                m.centre + m.radius * self.normal(turn, [s, t])
+                m.centre + m.radius * normal
             }
             Self::Triangle([a, b, c]) => *a + s * (*b - *a) + t * (*c - *a),
         }
     }
 
-    /// The normal there, of a sphere or cone.
+    /// The normal at such coordinates; zero for a triangle.
     fn normal(&self, turn: &DMat3, [s, t]: [f64; 2]) -> Vec3 {
-        let (sin, cos) = (TAU * t).sin_cos();
-        match self {
-            Self::Sphere(_) => {
-                let z = 1.0 - 2.0 * s;
-                let rho = ((1.0 - z) * (1.0 + z)).sqrt();
-                *turn * Vec3::new(rho * cos, rho * sin, z)
-            }
-            Self::Lateral(_, _, frame) => frame.normal(cos * turn.x_axis + sin * turn.y_axis),
-            Self::Triangle(_) => Vec3::ZERO,
+        if let Self::Triangle(_) = self {
+            return Vec3::ZERO;
         }
+        let (sin, cos) = (TAU * t).sin_cos();
+        if let Self::Lateral(_, _, frame) = self {
+            return frame.normal(cos * turn.x_axis + sin * turn.y_axis);
+        }
+        let z = 1.0 - 2.0 * s;
+        let rho = ((1.0 - z) * (1.0 + z)).sqrt();
+        *turn * Vec3::new(rho * cos, rho * sin, z)
     }
 
     /// Lengths along the coordinates, relative to each other, of cells that share a normal.
@@ -357,28 +369,29 @@ impl Surface {
         }
     }
 
-    /// Whether a ball of the cones or slabs between this sphere or cone and some others holds all
-    /// points of a cell deeper than a limit.
-    fn is_buried(
-        &self,
-        turn: &DMat3,
-        [[s0, s1], [t0, t1]]: [[f64; 2]; 2],
-        beside: &[Sphere],
-        depth: f64,
-    ) -> bool {
+    /// The normal in the middle of a cell, and a bound on the angles of others to it.
+    fn normals(&self, turn: &DMat3, [[s0, s1], [t0, t1]]: [[f64; 2]; 2]) -> (Vec3, f64) {
         let (s, t) = ((s0 + s1) / 2.0, (t0 + t1) / 2.0);
-        // A bound on the angles of the normals to that in the middle.
-        let ([a, b], angle) = match self {
+        let around = PI * (t1 - t0);
+        let angle = match self {
             // Along the meridian to the middle, and from there along the circle.
-            Self::Sphere(m) => {
+            Self::Sphere(_) => {
                 let [low, middle, high] = [s0, s, s1].map(|s| (1.0 - 2.0 * s).acos());
-                let along = (middle - low).max(high - middle);
-                ([m, m], along + PI * (t1 - t0) * middle.sin())
+                (middle - low).max(high - middle) + around * middle.sin()
             }
-            Self::Lateral(a, b, _) => ([a, b], PI * (t1 - t0)),
+            Self::Lateral(..) | Self::Triangle(_) => around,
+        };
+        (self.normal(turn, [s, t]), angle)
+    }
+
+    /// Whether a ball between this sphere or cone and one of some others holds all points whose normals
+    /// are within an angle of `normal`, deeper than a limit.
+    fn is_buried(&self, normal: Vec3, angle: f64, beside: &[Sphere], depth: f64) -> bool {
+        let [a, b] = match self {
+            Self::Sphere(m) => [m, m],
+            Self::Lateral(a, b, _) => [a, b],
             Self::Triangle(_) => return false,
         };
-        let normal = self.normal(turn, [s, t]);
         let radius = a.radius.min(b.radius);
         beside.iter().any(|c| {
             // On the way from the ball m of this surface to c, in steps k from 0 to 1, the depth of a

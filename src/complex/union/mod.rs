@@ -354,7 +354,8 @@ impl MedialUnion {
             });
             let signed = match again {
                 Some(_) => None,
-                None => Some(self.signed_from(p, &mut near)).filter(|&signed| signed >= -depth),
+                None => Some(self.deepest_or(p, &mut near, (-depth).next_down()).signed)
+                    .filter(|&signed| signed >= -depth),
             };
             if signed.is_none() {
                 let burier = again.map_or(Some(near), |turn| recent[turn]);
