@@ -41,7 +41,7 @@ pub struct Arguments {
     /// [default: all but those that run on request].
     #[arg(long, value_name = "ID[:KEY=VALUE]", value_delimiter = ',')]
     methods: Vec<String>,
-    /// Simplify to these sphere counts [default: 500,200,100; 100,50 without a mesh].
+    /// Simplify to these sphere counts [default: 200,100,50; 100,50 without a mesh].
     #[arg(long, value_name = "COUNTS", value_delimiter = ',')]
     spheres: Vec<usize>,
     /// Run method ID at these native levels instead of its default sweep; repeatable.

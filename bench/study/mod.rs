@@ -172,7 +172,7 @@ impl Default for Study {
             folder: None,
             meshes: vec![],
             dataset: vec![],
-            spheres: vec![500, 200, 100],
+            spheres: vec![200, 100, 50],
             max_error: vec![],
             noise: vec![],
             counts_only: false,

@@ -130,7 +130,7 @@ fn a_result_without_a_file_is_refused_before_it_is_computed() {
 #[test]
 fn lists_of_defaults_are_shown_with_commas() {
     for option in ["-h", "--help"] {
-        assert!(done(&["compare", option]).contains("[default: 500,200,100"));
+        assert!(done(&["compare", option]).contains("[default: 200,100,50"));
     }
 }
 
