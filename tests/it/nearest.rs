@@ -177,6 +177,19 @@ fn complex(count: u32, radius: f64, rng: &mut Pcg64) -> MedialMesh {
     MedialMesh::from_simplices(spheres, edges, faces).unwrap()
 }
 
+/// Balls in a ball, from inside towards its surface: cones along which the radius falls to nothing.
+fn spikes(count: u32, rng: &mut Pcg64) -> MedialMesh {
+    let ball = |normal: Vec3, radius: f64| Sphere::new((1.0 - radius) * normal, radius);
+    let ends = (0..count).flat_map(|_| {
+        let normal = vector(rng).normalize();
+        let aside = (normal + 0.1 * vector(rng)).normalize();
+        [ball(normal, 0.5 + 0.5 * rng.random::<f64>()), ball(aside, 0.03 * rng.random::<f64>())]
+    });
+    let spheres = ends.collect();
+    let edges = (0..count).map(|k| [2 * k, 2 * k + 1]).collect();
+    MedialMesh::from_simplices(spheres, edges, vec![]).unwrap()
+}
+
 fn all_signed(mesh: &MedialMesh, p: Vec3) -> Vec<(Primitive, f64)> {
     let sphere = |v: u32| mesh.spheres[v as usize];
     let mut all = Vec::new();
@@ -198,8 +211,9 @@ fn all_signed(mesh: &MedialMesh, p: Vec3) -> Vec<(Primitive, f64)> {
 #[test]
 fn union_distances_match_brute_force() {
     let mut rng = Pcg64::seed_from_u64(12);
-    for radius in [0.0, 0.1, 0.8] {
-        let mesh = complex(60, radius, &mut rng);
+    let mut meshes: Vec<_> = [0.0, 0.1, 0.8].map(|radius| complex(60, radius, &mut rng)).into();
+    meshes.push(spikes(400, &mut rng));
+    for mesh in meshes {
         let union = MedialUnion::new(&mesh).unwrap();
         let queries: Vec<Vec3> = (0..600).map(|_| vector(&mut rng) * 2.0).collect();
         let (signed, nearest) =

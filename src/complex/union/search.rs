@@ -396,13 +396,14 @@ pub(super) struct Part {
     /// Box around the centres.
     centres: Bounds,
     largest_radius: f64,
+    balls: Vec<Sphere>,
 }
 
 impl Part {
     pub fn new(primitive: Primitive, shape: Shape, balls: &[Sphere]) -> Self {
         let largest_radius = balls.iter().fold(0.0, |r, m| f64::max(r, m.radius));
         let centres = Bounds::of_points(balls.iter().map(|m| m.centre));
-        Self { primitive, shape, centres, largest_radius }
+        Self { primitive, shape, centres, largest_radius, balls: balls.to_vec() }
     }
 }
 
@@ -464,7 +465,8 @@ impl Parts {
         let sides = boxes.iter().map(|(b, _)| (b.hi - b.lo).max_element());
         let padding = sides.sum::<f64>() / boxes.len() as f64;
         let tree = Tree::build(&boxes, Plan { max_leaf: LEAF, group: LANES, padding });
-        let quick = ReachTree::new(&tree, balls);
+        let of = |place: u32| parts[tree.order()[place as usize] as usize].balls.as_slice();
+        let quick = ReachTree::new(&tree, balls, of);
         let extents = boxes.iter().map(|(b, radius)| (b.hi - b.lo).length() + radius);
         let slack = ROUNDING * extents.fold(0.0, f64::max);
         let mut order = tree.order().to_vec();

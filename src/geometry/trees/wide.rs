@@ -11,11 +11,12 @@
 
 use std::ops::{ControlFlow, Range};
 
+use glam::DMat3;
 use wide::f32x4;
 
 use crate::planar_frame::power_of_two_below;
 use crate::trees::{Bounds, MAX_DEPTH, Tree};
-use crate::{Cone, SlabFace, Vec3};
+use crate::{Cone, SlabFace, Sphere, Vec3};
 
 /// Bound on the error of distances in single precision, to boxes and to triangles. The longest
 /// computation, for a triangle, has less than 25 roundings of 2^-24 each.
@@ -118,7 +119,7 @@ impl WideTree {
         tree: &Tree,
         frame: Bounds,
         least: f64,
-        mut each: impl FnMut(&[&crate::trees::Node]),
+        mut each: impl FnMut(&[usize]),
     ) -> Self {
         let frame = Frame::new(frame);
         let least = least / frame.scale;
@@ -154,7 +155,7 @@ impl WideTree {
         tree: &Tree,
         index: usize,
         least: f64,
-        each: &mut impl FnMut(&[&crate::trees::Node]),
+        each: &mut impl FnMut(&[usize]),
     ) -> u32 {
         let node = &tree.nodes[index];
         if node.count > 0 || (node.bounds.hi - node.bounds.lo).max_element() < least {
@@ -163,7 +164,7 @@ impl WideTree {
             return LEAF | (self.leaves.len() - 1) as u32;
         }
         let children = descendants(tree, index);
-        each(&children.iter().map(|&child| &tree.nodes[child]).collect::<Vec<_>>());
+        each(&children);
         let place = self.nodes.len();
         // The place is taken before the children's, so that parents precede them.
         let empty = Lanes::splat(f32::INFINITY);
@@ -200,7 +201,7 @@ impl WideTree {
     /// limit, and returns the new one. Limits are squared distances.
     #[inline]
     pub fn nearest(&self, query: &Query, limit: f32, visit: impl FnMut(usize, f32) -> f32) {
-        self.search(limit, |place| self.nodes[place].distance_squared(query), visit);
+        self.search(limit, |place, _| self.nodes[place].distance_squared(query), visit);
     }
 
     /// Shows the leaves with points that may be nearer than `foot` to a point of the ball around a
@@ -225,7 +226,7 @@ impl WideTree {
         let diameter = Lanes::splat((2.0 * radius) as f32);
         self.search(
             limit,
-            |place| {
+            |place, _| {
                 let node = &self.nodes[place];
                 node.distance_squared(query) - diameter * node.farthest_squared(foot).sqrt()
             },
@@ -234,12 +235,13 @@ impl WideTree {
     }
 
     /// As [`WideTree::nearest`] with another measure: `bounds` gives lower bounds for the children of
-    /// the node at a place. A bound that is not a number is beyond every limit.
+    /// the node at a place, which need not be tight beyond the limit. A bound that is not a number is
+    /// beyond every limit.
     #[inline]
     pub(super) fn search(
         &self,
         mut limit: f32,
-        bounds: impl Fn(usize) -> Lanes,
+        bounds: impl Fn(usize, Lanes) -> Lanes,
         mut visit: impl FnMut(usize, f32) -> f32,
     ) {
         let mut stack = [(0.0_f32, 0_u32); 3 * MAX_DEPTH + 4];
@@ -247,9 +249,10 @@ impl WideTree {
         let mut current = self.root;
         loop {
             if current & LEAF == 0 {
-                let bounds = bounds(current as usize);
+                let limit = Lanes::splat(limit);
+                let bounds = bounds(current as usize, limit);
                 let children = &self.nodes[current as usize].children;
-                let mut hits = bounds.simd_le(Lanes::splat(limit)).to_bitmask();
+                let mut hits = bounds.simd_le(limit).to_bitmask();
                 let bounds = bounds.to_array();
                 let bottom = height;
                 while hits != 0 {
@@ -389,8 +392,18 @@ impl Measure {
 #[derive(Clone, Debug)]
 pub struct ReachTree {
     wide: WideTree,
-    /// For each node the largest and the smallest radius below its children.
-    radii: Vec<[Lanes; 2]>,
+    /// Of each node.
+    radii: Vec<Radii>,
+}
+
+/// The radii below the children of a node.
+#[derive(Clone, Copy, Debug)]
+struct Radii {
+    largest: Lanes,
+    smallest: Lanes,
+    /// The radius is at most `middle + slope * (centre - middle of the box)`.
+    slope: [Lanes; 3],
+    middle: Lanes,
 }
 
 /// Single precision does not separate centres closer together than this, in half sides of the frame:
@@ -398,21 +411,35 @@ pub struct ReachTree {
 const CLUSTER: f64 = 1e-5;
 
 impl ReachTree {
-    /// Collapses a tree over boxes of centres whose reaches are radii. All balls are within `frame`.
-    pub fn new(tree: &Tree, frame: Bounds) -> Self {
-        let mut radii = Vec::new();
-        let wide = WideTree::within(tree, frame, CLUSTER, |children: &[&super::Node]| {
+    /// Collapses a tree over boxes of centres whose reaches are radii. All balls are within `frame`;
+    /// `balls` gives those of the hull at a place of the tree.
+    pub fn new<'a>(tree: &Tree, frame: Bounds, balls: impl Fn(u32) -> &'a [Sphere]) -> Self {
+        let mut radii: Vec<[[f64; 4]; 6]> = Vec::new();
+        let wide = WideTree::within(tree, frame, CLUSTER, |children: &[usize]| {
             // Lanes without a child have an empty box, so any radius will do.
-            let mut of = [[0.0; 4]; 2];
-            for (lane, child) in children.iter().enumerate() {
-                (of[0][lane], of[1][lane]) = (child.reach, child.least_reach);
+            let mut of = [[0.0; 4]; 6];
+            for (lane, &child) in children.iter().enumerate() {
+                let node = &tree.nodes[child];
+                let places = tree.places(child);
+                let (slope, middle) = if places.len() > MAX_SLOPED {
+                    (Vec3::ZERO, node.reach)
+                } else {
+                    slope(&node.bounds, || places.clone().flat_map(&balls))
+                };
+                let values = [node.reach, node.least_reach, middle, slope.x, slope.y, slope.z];
+                for (of, value) in of.iter_mut().zip(values) {
+                    of[lane] = value;
+                }
             }
             radii.push(of);
         });
         let scale = wide.frame().scale;
-        let scaled = radii
-            .into_iter()
-            .map(|pair| pair.map(|of| Lanes::from(of.map(|radius| (radius * scale) as f32))));
+        let scaled = radii.into_iter().map(|of| {
+            let [largest, smallest, middle] =
+                [0, 1, 2].map(|k| Lanes::from(of[k].map(|length| (length * scale) as f32)));
+            let slope = [3, 4, 5].map(|k| Lanes::from(of[k].map(|slope| slope as f32)));
+            Radii { largest, smallest, slope, middle }
+        });
         Self { wide, radii: scaled.collect() }
     }
 
@@ -440,21 +467,78 @@ impl ReachTree {
         limit: f32,
         visit: impl FnMut(usize, f32) -> f32,
     ) {
-        self.wide.search(limit, |place| self.bounds(place, query, measure), visit);
+        self.wide.search(limit, |place, limit| self.bounds(place, query, measure, limit), visit);
     }
 
     /// Lower bounds of the distances to the hulls below the children of a node.
     #[inline]
-    fn bounds(&self, place: usize, query: &Query, measure: Measure) -> Lanes {
-        let (node, [largest, smallest]) = (self.wide.node(place), &self.radii[place]);
-        let outside = node.distance_squared(query).sqrt() - *largest;
-        match measure {
+    fn bounds(&self, place: usize, query: &Query, measure: Measure, limit: Lanes) -> Lanes {
+        let (node, radii) = (self.wide.node(place), &self.radii[place]);
+        let outside = node.distance_squared(query).sqrt() - radii.largest;
+        let bounds = match measure {
             Measure::Signed => outside,
             // Each hull holds its largest ball, whose centre is in the box.
-            Measure::Unsigned => outside.fast_max(*smallest - node.farthest_squared(query).sqrt()),
+            Measure::Unsigned => {
+                outside.fast_max(radii.smallest - node.farthest_squared(query).sqrt())
+            }
+        };
+        if bounds.simd_le(limit).none() {
+            return bounds;
         }
+        // This bound decides what is visited, but not the order, on which the result of a search that
+        // ends early depends. All bits set are not a number.
+        bounds | node.sloped(query, radii).simd_gt(limit)
     }
 }
+
+impl Node {
+    /// Lower bounds of the distances to the hulls below the children.
+    ///
+    /// `|p - x| - r(x)`, with `r` the linear bound of the radii, is a convex function of the centre `x`,
+    /// and so at least its tangent in the middle of the box, which is least at a corner.
+    #[inline]
+    fn sloped(&self, query: &Query, radii: &Radii) -> Lanes {
+        let half = Lanes::splat(0.5);
+        let to = [0, 1, 2].map(|k| (self.lo[k] + self.hi[k]) * half - query.p[k]);
+        let distance = (to[0] * to[0] + to[1] * to[1] + to[2] * to[2]).sqrt();
+        let inverse = Lanes::ONE / distance.fast_max(Lanes::splat(f32::MIN_POSITIVE));
+        let fall = |k: usize| {
+            (to[k] * inverse - radii.slope[k]).abs() * ((self.hi[k] - self.lo[k]) * half)
+        };
+        distance - radii.middle - fall(0) - fall(1) - fall(2)
+    }
+}
+
+/// The slope of the radii of some balls over their centres, and the least value in the middle of a
+/// box such that no ball is larger.
+fn slope<'a, I: Iterator<Item = &'a Sphere>>(
+    bounds: &Bounds,
+    balls: impl Fn() -> I,
+) -> (Vec3, f64) {
+    let middle = bounds.lo + (bounds.hi - bounds.lo) * 0.5;
+    let count = balls().count() as f64;
+    let centre = balls().map(|m| m.centre - middle).sum::<Vec3>() / count;
+    let radius = balls().map(|m| m.radius).sum::<f64>() / count;
+    let (mut square, mut product) = (DMat3::ZERO, Vec3::ZERO);
+    for m in balls() {
+        let d = m.centre - middle - centre;
+        square += DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+        product += d * (m.radius - radius);
+    }
+    // Least squares, towards zero where the centres hardly differ.
+    let trace = square.x_axis.x + square.y_axis.y + square.z_axis.z;
+    square += DMat3::from_diagonal(Vec3::splat(RIDGE * trace));
+    let fitted = square.inverse() * product;
+    // Any slope bounds; a steep one is a fit to nearly coincident centres.
+    let slope = if fitted.is_finite() { fitted.clamp_length_max(1.0) } else { Vec3::ZERO };
+    let excess = balls().map(|m| m.radius - slope.dot(m.centre - middle));
+    (slope, excess.fold(f64::NEG_INFINITY, f64::max))
+}
+
+/// Larger nodes, over which a slope would say little, have none.
+const MAX_SLOPED: usize = 1000;
+/// Of the variance of centres, added along each axis.
+const RIDGE: f64 = 1e-4;
 
 // Four hulls of balls measured together in single precision, to select those worth measuring in
 // double precision.
