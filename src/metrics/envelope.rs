@@ -10,6 +10,10 @@
 //!    most ten times as many candidates as requested samples, or more until a quarter of the
 //!    requested number survives.
 //!
+//! Most candidates are inside a ball between their own sphere or cone and a neighbour. That is tested
+//! for cells of a patch before their candidates are made, then for each candidate, and only the rest is
+//! searched for. The tests keep a margin, so the samples are those of searches alone.
+//!
 //! Spheres are sampled along an equal-area spiral, cones and triangles by low-discrepancy sequences.
 //! Each patch is turned or shifted at random, so that even a single sample is uniformly distributed
 //! over its patch.
@@ -86,6 +90,9 @@ const PLASTIC: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 ///
 /// # Errors
 /// When no samples are requested.
+///
+/// # Panics
+/// If a side of a face of `mesh` is not an edge, as no mesh with a union has it.
 pub fn sample_envelope(
     mesh: &MedialMesh,
     union: &MedialUnion,
@@ -479,4 +486,39 @@ fn random_rotation(rng: &mut Pcg64) -> glam::DQuat {
     let (s2, c2) = (TAU * second).sin_cos();
     let (a, b) = ((1.0 - split).sqrt(), split.sqrt());
     glam::DQuat::from_xyzw(a * s1, a * c1, b * s2, b * c2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_and_points_that_are_not_searched_for_hold_no_samples() {
+        let mut rng = Pcg64::seed_from_u64(5);
+        let side = 5_u32;
+        let mut ball = |k: u32| {
+            let jitter = Vec3::from([(); 3].map(|()| 0.05 * rng.random::<f64>()));
+            let at = 0.2 * Vec3::new(f64::from(k % side), f64::from(k / side), 0.0);
+            Sphere::new(at + jitter, 0.2 + 0.1 * rng.random::<f64>())
+        };
+        let spheres = (0..side * side).map(&mut ball).collect();
+        let corners = (0..side * (side - 1)).filter(|k| k % side < side - 1);
+        let faces =
+            corners.flat_map(|k| [[k, k + 1, k + side], [k + 1, k + side, k + side + 1]]).collect();
+        let mesh = MedialMesh::from_simplices(spheres, vec![], faces).unwrap();
+        let union = MedialUnion::new(&mesh).unwrap();
+        let pose = Pose::coordinates();
+        for burial in [0.0, 1e-7, 1e-2] {
+            let options = EnvelopeOptions { samples: 1000, burial, seed: 1 };
+            let mut patches = patches(&mesh, &pose);
+            let sampled = |patches: &[Patch]| {
+                let Weighted { points, weights } =
+                    sample_patches(patches, pose.axes(), 2_000.0, &union, &options);
+                (points, weights)
+            };
+            let some = sampled(&patches);
+            patches.iter_mut().for_each(|patch| patch.beside.clear());
+            assert!(some == sampled(&patches) && some.0.len() > 1000);
+        }
+    }
 }
