@@ -177,7 +177,7 @@ struct Patch {
     /// The cells of its spheres, in ascending order; zero where it has fewer.
     cells: [[u64; 2]; 3],
     /// Other ends of the edges of a sphere; third spheres of the faces of a cone.
-    beside: Vec<Sphere>,
+    neighbours: Vec<Sphere>,
 }
 
 /// The patches of a mesh, in an order that neither the numbering nor rounding changes.
@@ -200,14 +200,14 @@ fn patches(mesh: &MedialMesh, pose: &Pose) -> Vec<Patch> {
     let mut patches: Vec<Patch> = (0..)
         .zip(&mesh.spheres)
         .zip(at_spheres)
-        .map(|((v, &m), beside)| Patch {
+        .map(|((v, &m), neighbours)| Patch {
             surface: Surface::Sphere(m),
             kind: 0,
             cells: of(&[v]),
-            beside,
+            neighbours,
         })
         .collect();
-    for (&(mut ends), beside) in mesh.edges.iter().zip(at_edges) {
+    for (&(mut ends), neighbours) in mesh.edges.iter().zip(at_edges) {
         ends.sort_by_key(|&v| cells[v as usize]);
         let [a, b] = mesh.spheres_of(ends);
         if let Some(frame) = Cone::new(a, b).frame() {
@@ -215,7 +215,7 @@ fn patches(mesh: &MedialMesh, pose: &Pose) -> Vec<Patch> {
                 surface: Surface::Lateral(a, b, frame),
                 kind: 1,
                 cells: of(&ends),
-                beside,
+                neighbours,
             });
         }
     }
@@ -226,7 +226,7 @@ fn patches(mesh: &MedialMesh, pose: &Pose) -> Vec<Patch> {
             for (normal, kind) in planes.normals().into_iter().zip(2..) {
                 let surface = Surface::Triangle(balls.map(|m| m.centre + m.radius * normal));
                 let cells = of(&corners);
-                patches.push(Patch { surface, kind, cells, beside: Vec::new() });
+                patches.push(Patch { surface, kind, cells, neighbours: Vec::new() });
             }
         }
     }
@@ -266,7 +266,7 @@ fn sample_patches(
     let samples = runs.flat_map_iter(|(patches, counts)| {
         let points = patches.iter().zip(counts).flat_map(|(patch, &count)| {
             let mut rng = Pcg64::seed_from_u64(options.seed ^ patch.stream());
-            patch.surface.sample(axes, count, &mut rng, &patch.beside, depth)
+            patch.surface.sample(axes, count, &mut rng, &patch.neighbours, depth)
         });
         let points = points.collect();
         union.unburied(points, options.burial).into_iter().filter_map(|(point, signed)| {
@@ -298,7 +298,7 @@ impl Surface {
         axes: [Vec3; 3],
         count: usize,
         rng: &mut Pcg64,
-        beside: &[Sphere],
+        neighbours: &[Sphere],
         depth: f64,
     ) -> Vec<Vec3> {
         let shift = [rng.random::<f64>(), rng.random::<f64>()];
@@ -313,11 +313,11 @@ impl Surface {
             }
             Self::Triangle(_) => DMat3::IDENTITY,
         };
-        let mut grid = Grid::new(if beside.is_empty() { 0 } else { count }, self.lengths());
+        let mut grid = Grid::new(if neighbours.is_empty() { 0 } else { count }, self.lengths());
         let all = [0..grid.sides[0], 0..grid.sides[1]];
         grid.bury(all, &|cell| {
             let (normal, angle) = self.normals(&turn, cell);
-            self.is_buried(normal, angle, beside, depth)
+            self.is_buried(normal, angle, neighbours, depth)
         });
         let level = |i: usize| (i as f64 + 0.5) / count as f64;
         let places = (0..count).map(|i| match self {
@@ -333,7 +333,7 @@ impl Surface {
         });
         let places = places.filter(|&place| !grid.is_buried(place));
         let points = places.map(|place| (place, self.normal(&turn, place)));
-        let points = points.filter(|&(_, normal)| !self.is_buried(normal, 0.0, beside, depth));
+        let points = points.filter(|&(_, normal)| !self.is_buried(normal, 0.0, neighbours, depth));
         points.map(|(place, normal)| self.at(place, normal)).collect()
     }
 
@@ -393,14 +393,14 @@ impl Surface {
 
     /// Whether a ball between this sphere or cone and one of some others holds all points whose normals
     /// are within an angle of `normal`, deeper than a limit.
-    fn is_buried(&self, normal: Vec3, angle: f64, beside: &[Sphere], depth: f64) -> bool {
+    fn is_buried(&self, normal: Vec3, angle: f64, neighbours: &[Sphere], depth: f64) -> bool {
         let [a, b] = match self {
             Self::Sphere(m) => [m, m],
             Self::Lateral(a, b, _) => [a, b],
             Self::Triangle(_) => return false,
         };
         let radius = a.radius.min(b.radius);
-        beside.iter().any(|c| {
+        neighbours.iter().any(|c| {
             // On the way from the ball m of this surface to c, in steps k from 0 to 1, the depth of a
             // point with normal n in the ball grows by at least k * rise - k^2 |c - m|^2 / (2 r_m), with
             // rise = n * (c - m) + r_c - r_m. Along the line of a cone with this normal the rise is the same.
@@ -517,7 +517,7 @@ mod tests {
                 (points, weights)
             };
             let some = sampled(&patches);
-            patches.iter_mut().for_each(|patch| patch.beside.clear());
+            patches.iter_mut().for_each(|patch| patch.neighbours.clear());
             assert!(some == sampled(&patches) && some.0.len() > 1000);
         }
     }

@@ -485,8 +485,8 @@ impl ReachTree {
         if bounds.simd_le(limit).none() {
             return bounds;
         }
-        // This bound decides what is visited, but not the order, on which the result of a search that
-        // ends early depends. All bits set are not a number.
+        // The order of visits stays that of the boxes: a search that ends early would otherwise find
+        // another primitive. A lane with all bits set is not a number, and is skipped.
         bounds | node.sloped(query, radii).simd_gt(limit)
     }
 }
