@@ -57,7 +57,7 @@ impl Progress {
     /// Shows the current mesh and method, and the number of the repetition among `of`.
     pub fn at(&mut self, mesh: &str, method: &str, [turn, of]: [usize; 2]) {
         let left = estimate(&self.seen, &self.ahead).map_or_else(String::new, |seconds| {
-            let left = Duration::from_secs_f64(seconds / self.jobs as f64);
+            let left = Duration::from_secs((seconds / self.jobs as f64).ceil() as u64);
             format!(", about {} left", HumanDuration(left))
         });
         self.begun += 1;
