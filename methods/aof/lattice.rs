@@ -13,7 +13,8 @@
 //!    is evaluated, and the voxel with all its descendants dismissed if `AOF' >= 0`, by default up
 //!    to the flux of the samples themselves in a constant field.
 //! 4. At the finest level: `AOF'` of every voxel whose sphere lies inside. The final threshold is
-//!    applied later, as it depends on the requested level.
+//!    applied later, as it depends on the requested level. At the published level it is known: then
+//!    a sphere is given up as soon as the samples left cannot bring its flux down to it.
 //!
 //! Blocks are independent; they run in parallel and are collected in order.
 
@@ -126,7 +127,7 @@ pub struct Voxel {
     pub place: Place,
     /// Distance of its centre to the surface, a fraction of the diagonal.
     pub distance: f32,
-    /// `AOF'`; 0 if the voxel was dismissed at a coarser level.
+    /// `AOF'`; 0 if the voxel was dismissed at a coarser level, infinite if larger than wanted.
     pub flux: f32,
 }
 
@@ -326,10 +327,12 @@ const BLOCKS: u32 = 4;
 const HALF_DIAGONAL: f64 = 0.866_025_403_784_438_6;
 
 /// The values of the voxels that are computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wanted {
     /// Places alone.
     Places,
+    /// Values of voxels with at most this flux; that of others that are not dismissed is infinite.
+    AtMost(f32),
     /// Values of all voxels that are not dismissed.
     Kept,
     /// Values of all voxels to begin with: distances of dismissed ones too.
@@ -494,10 +497,11 @@ impl Walk<'_> {
         let LatticeLevel { ref sphere, size, dismissed_from } = self.levels[level];
         let middle = Vec3::from(base.map(|i| f64::from(i) + f64::from(size) * 0.5));
         let centre = self.grid.origin + middle * self.grid.side;
-        let Closest { distance, face, .. } = match around {
+        let foot = match around {
             Some(near) => near.closest(centre, known.face),
             None => self.surface.closest(centre, Some(known.face)),
         };
+        let Closest { distance, face, .. } = foot;
         known.face = face;
         // Farthest centre of a descendant.
         let spread = HALF_DIAGONAL * (sphere.radius - self.grid.side);
@@ -514,15 +518,20 @@ impl Walk<'_> {
             known.is_inside = true;
         }
         let evaluate = !known.dismissed && self.wanted != Wanted::Places && sphere_fits;
+        let most = match self.wanted {
+            _ if !finest => dismissed_from,
+            Wanted::AtMost(most) => f64::from(most),
+            _ => f64::INFINITY,
+        };
         // The spheres of all descendants lie in that of the voxel.
         let near = (evaluate || self.wanted != Wanted::Places && !finest).then(|| match around {
-            Some(near) => near.within(centre, sphere.radius, face),
-            None => self.surface.near(centre, sphere.radius, face),
+            Some(near) => near.within(centre, sphere.radius, &foot),
+            None => self.surface.near(centre, sphere.radius, &foot),
         });
         let flux = match &near {
             Some(near) if evaluate => {
                 self.tally.evaluated += 1;
-                near.flux(sphere, centre, face)
+                near.flux(sphere, centre, &foot, most).unwrap_or(f64::INFINITY)
             }
             _ => 0.0,
         };
@@ -533,7 +542,7 @@ impl Walk<'_> {
         if evaluate && flux >= dismissed_from {
             self.tally.dismissed[level] += u64::from(size).pow(3);
             known.dismissed = true;
-            if self.wanted == Wanted::Kept {
+            if matches!(self.wanted, Wanted::Kept | Wanted::AtMost(_)) {
                 self.tally.start += u64::from(size).pow(3);
                 return;
             }

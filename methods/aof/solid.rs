@@ -26,6 +26,8 @@ pub struct Solid<'s> {
     volume: f64,
     /// Area of the surface.
     area: f64,
+    /// The only angle that levels ask for, if known.
+    angle: Option<f64>,
 }
 
 impl<'s> Solid<'s> {
@@ -42,7 +44,7 @@ impl<'s> Solid<'s> {
             volume += a.dot(b.cross(c)) / 6.0;
             area += (b - a).cross(c - a).length() / 2.0;
         }
-        Ok(Self { shape, surface, params, run, volume, area })
+        Ok(Self { shape, surface, params, run, volume, area, angle: None })
     }
 
     /// The lattice of a resolution.
@@ -61,7 +63,11 @@ impl<'s> Solid<'s> {
     }
 
     fn wanted(&self) -> Wanted {
-        if self.params.variant == Variant::Plain { Wanted::Kept } else { Wanted::All }
+        match (self.params.variant, self.angle) {
+            (Variant::Plain, Some(angle)) => Wanted::AtMost(self.params.threshold(angle)),
+            (Variant::Plain, None) => Wanted::Kept,
+            _ => Wanted::All,
+        }
     }
 
     /// The axis of a lattice for an object angle in degrees.
@@ -410,6 +416,7 @@ pub(super) fn published<'s>(
     let published = params.resolution;
     let is_free = settings.resolution == Auto::Auto;
     let mut solid = Solid::new(shape, params, run.clone())?;
+    solid.angle = Some(solid.params.angle);
     if is_free {
         solid.params.resolution = solid.fitting_resolution();
     }

@@ -234,14 +234,10 @@ impl TriangleBvh {
     }
 
     /// The triangles that can be closest to a point of a ball; `None` where they are too many for
-    /// searches among them to be faster. A face `start` near to the centre speeds this up.
-    ///
-    /// # Panics
-    /// If `start` is not a face.
-    pub fn vicinity(&self, centre: Vec3, radius: f64, start: Option<u32>) -> Option<Vicinity<'_>> {
+    /// searches among them to be faster. `foot` is the closest point to the centre.
+    pub fn vicinity(&self, centre: Vec3, radius: f64, foot: &Closest) -> Option<Vicinity<'_>> {
         let query = self.wide.query(centre)?;
-        let foot = self.closest_from(centre, start);
-        let mut search = Collect::new(self, centre, radius, &foot);
+        let mut search = Collect::new(self, centre, radius, foot);
         let limit = query.limit(search.reach);
         let foot = self.wide.query(foot.point)?;
         self.wide.rivals(&query, &foot, search.least, radius, |leaf| {
@@ -285,12 +281,18 @@ impl TriangleBvh {
     }
 
     fn describe(&self, p: Vec3, place: usize, squared: f64) -> Closest {
+        let (feature, point) = self.nearest_point(p, place);
+        Closest { point, distance: squared.sqrt(), face: self.tree.order()[place], feature }
+    }
+
+    /// The closest point of one triangle.
+    fn nearest_point(&self, p: Vec3, place: usize) -> (Feature, Vec3) {
         let frame = &self.frames[place];
         let corners = &self.corners[place];
         let first = usize::from(self.firsts[place]);
         let order = [first, (first + 1) % 3, (first + 2) % 3];
         let (part, t) = frame.nearest_part(p);
-        let (feature, point) = match part {
+        match part {
             Part::Face => {
                 let [x, y, _] = frame.local(p);
                 (Feature::Face, frame.point(x, y))
@@ -300,8 +302,7 @@ impl TriangleBvh {
                 (Feature::Edge(order[k] as u8), a.lerp(b, t))
             }
             Part::Corner(k) => (Feature::Vertex(order[k] as u8), corners[order[k]]),
-        };
-        Closest { point, distance: squared.sqrt(), face: self.tree.order()[place], feature }
+        }
     }
 }
 
@@ -375,6 +376,8 @@ pub struct Vicinity<'a> {
     centre: Vec3,
     radius: f64,
     tangents: Vec<Tangents>,
+    /// See [`Vicinity::gradient`].
+    gradient: Option<(Vec3, f64)>,
 }
 
 /// The tangents of four triangles in single precision, in the [`Frame`] of the wide tree. Lanes
@@ -385,6 +388,13 @@ struct Tangents {
     /// In the centre.
     distance: Lanes,
     places: [u32; 4],
+}
+
+/// One of them.
+struct Tangent {
+    gradient: [f32; 3],
+    distance: f32,
+    place: u32,
 }
 
 /// Bound on the error of a tangent in single precision, per unit of distance and radius: ten
@@ -412,16 +422,26 @@ impl<'a> Vicinity<'a> {
         (found.place != NONE).then(|| self.bvh.describe(p, found.place, found.squared))
     }
 
-    /// That of a ball inside this one, whose centre is near the face `start`.
-    ///
-    /// # Panics
-    /// If `start` is not a face.
-    pub fn narrowed(&self, centre: Vec3, radius: f64, start: u32) -> Option<Self> {
-        let foot = self.closest_from(centre, start);
-        let mut search = Collect::new(self.bvh, centre, radius, &foot);
-        let (offset, limit) = (self.offset(centre), self.limit(search.reach));
+    /// The gradient of the distance in the centre, and the largest difference from it of the gradient
+    /// there of the distance to any triangle of the vicinity. None if the ball reaches the surface.
+    pub fn gradient(&self) -> Option<(Vec3, f64)> {
+        self.gradient
+    }
+
+    /// That of a ball inside this one; `foot` is the closest point to its centre.
+    pub fn narrowed(&self, centre: Vec3, radius: f64, foot: &Closest) -> Option<Self> {
+        let mut search = Collect::new(self.bvh, centre, radius, foot);
+        // As in [`Collect::add`], with the tangents in the old centre. One without a gradient is a
+        // lower bound in the whole ball.
+        let own = search.gradient.unwrap_or(Vec3::ZERO).to_array();
+        let own = own.map(|x| Lanes::splat(x as f32));
+        let limit = self.limit(search.least + search.bend);
+        let radius = Lanes::splat((radius * self.bvh.wide.frame().scale) as f32);
+        let offset = self.offset(centre);
         for tangents in &self.tangents {
-            tangents.each_within(&offset, limit, |place| search.add(place));
+            let apart = [0, 1, 2].map(|axis| tangents.gradient[axis] - own[axis]);
+            let apart = dot(&apart, &apart).sqrt();
+            tangents.each_within(&offset, limit + apart * radius, |place| search.add(place));
         }
         search.finish()
     }
@@ -455,6 +475,21 @@ impl<'a> Vicinity<'a> {
 }
 
 impl Tangents {
+    fn of(tangents: &[Tangent]) -> Vec<Self> {
+        let none = Tangent { gradient: [0.0; 3], distance: f32::INFINITY, place: 0 };
+        let blocks = tangents.chunks(4).map(|four| {
+            let of = |k: usize| four.get(k).unwrap_or(&none);
+            let lanes =
+                |value: &dyn Fn(&Tangent) -> f32| Lanes::from([0, 1, 2, 3].map(|k| value(of(k))));
+            Self {
+                gradient: [0, 1, 2].map(|axis| lanes(&|tangent| tangent.gradient[axis])),
+                distance: lanes(&|tangent| tangent.distance),
+                places: [0, 1, 2, 3].map(|k| of(k).place),
+            }
+        });
+        blocks.collect()
+    }
+
     #[inline]
     fn each_within(&self, offset: &[Lanes; 3], limit: Lanes, mut each: impl FnMut(u32)) {
         let lower = self.distance + dot(&self.gradient, offset);
@@ -467,7 +502,7 @@ impl Tangents {
 }
 
 /// More triangles are searched in the tree.
-const MAX_VICINITY: usize = 192;
+const MAX_VICINITY: usize = 768;
 
 /// Collects a [`Vicinity`].
 struct Collect<'a> {
@@ -480,6 +515,8 @@ struct Collect<'a> {
     gradient: Option<Vec3>,
     /// Distance of the centre beyond which no triangle is closest to a point of the ball.
     reach: f64,
+    /// The distance to the foot exceeds its tangent in the centre by no more.
+    bend: f64,
     found: Vec<(f64, Vec3, u32)>,
 }
 
@@ -488,25 +525,25 @@ impl<'a> Collect<'a> {
         let least = foot.distance;
         let gradient = (least > radius).then(|| (centre - foot.point) / least);
         let reach = padded(least + 2.0 * radius, bvh.slack);
-        Self { bvh, centre, radius, least, gradient, reach, found: Vec::new() }
+        let bend = if gradient.is_some() { radius * radius / (2.0 * least) } else { radius };
+        Self { bvh, centre, radius, least, gradient, reach, bend, found: Vec::new() }
     }
 
     /// Adds a triangle, unless the foot of the centre is nearer to all points of the ball.
     fn add(&mut self, place: u32) {
-        let squared = self.bvh.frames[place as usize].distance_squared(self.centre);
-        let distance = squared.sqrt();
+        let from = self.centre - self.bvh.nearest_point(self.centre, place as usize).1;
+        let distance = from.length();
+        if distance > self.reach {
+            return;
+        }
         let Some(gradient) = self.gradient else {
-            if distance <= self.reach {
-                self.found.push((distance - self.radius, Vec3::ZERO, place));
-            }
+            self.found.push((distance - self.radius, Vec3::ZERO, place));
             return;
         };
-        let closest = self.bvh.describe(self.centre, place as usize, squared);
-        let own = (self.centre - closest.point) / distance;
         // The foot is no farther from the point `v` away from the centre than the tangent there plus
         // `v² / 2 d`, and the triangle no nearer than its own tangent.
-        let bend = self.radius * self.radius / (2.0 * self.least);
-        let reach = self.least + gradient.distance(own) * self.radius + bend;
+        let own = from / distance;
+        let reach = self.least + gradient.distance(own) * self.radius + self.bend;
         if distance <= padded(reach, 4.0 * self.bvh.slack) {
             self.found.push((distance, own, place));
         }
@@ -523,19 +560,18 @@ impl<'a> Collect<'a> {
         // The likeliest first.
         self.found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let scale = self.bvh.wide.frame().scale;
-        let tangents = self.found.chunks(4).map(|four| {
-            let of = |k: usize| four.get(k).copied().unwrap_or((f64::INFINITY, Vec3::ZERO, 0));
-            let lanes = |value: &dyn Fn((f64, Vec3, u32)) -> f64| {
-                Lanes::from([0, 1, 2, 3].map(|k| value(of(k)) as f32))
-            };
-            Tangents {
-                gradient: [0, 1, 2].map(|axis| lanes(&|(_, gradient, _)| gradient[axis])),
-                distance: lanes(&|(distance, ..)| distance * scale),
-                places: [0, 1, 2, 3].map(|k| of(k).2),
-            }
+        let tangents = self.found.iter().map(|&(distance, gradient, place)| Tangent {
+            gradient: gradient.to_array().map(|x| x as f32),
+            distance: (distance * scale) as f32,
+            place,
         });
-        let tangents = tangents.collect();
-        Some(Vicinity { bvh: self.bvh, centre: self.centre, radius: self.radius, tangents })
+        let Self { bvh, centre, radius, .. } = self;
+        let tangents = Tangents::of(&tangents.collect::<Vec<_>>());
+        let gradient = self.gradient.map(|gradient| {
+            let differences = self.found.iter().map(|&(_, own, _)| gradient.distance(own));
+            (gradient, differences.fold(0.0, f64::max))
+        });
+        Some(Vicinity { bvh, centre, radius, tangents, gradient })
     }
 }
 
