@@ -390,13 +390,6 @@ struct Tangents {
     places: [u32; 4],
 }
 
-/// One of them.
-struct Tangent {
-    gradient: [f32; 3],
-    distance: f32,
-    place: u32,
-}
-
 /// Bound on the error of a tangent in single precision, per unit of distance and radius: ten
 /// roundings of numbers up to three times as large.
 const TANGENT_BLUR: f64 = 2e-6;
@@ -475,21 +468,6 @@ impl<'a> Vicinity<'a> {
 }
 
 impl Tangents {
-    fn of(tangents: &[Tangent]) -> Vec<Self> {
-        let none = Tangent { gradient: [0.0; 3], distance: f32::INFINITY, place: 0 };
-        let blocks = tangents.chunks(4).map(|four| {
-            let of = |k: usize| four.get(k).unwrap_or(&none);
-            let lanes =
-                |value: &dyn Fn(&Tangent) -> f32| Lanes::from([0, 1, 2, 3].map(|k| value(of(k))));
-            Self {
-                gradient: [0, 1, 2].map(|axis| lanes(&|tangent| tangent.gradient[axis])),
-                distance: lanes(&|tangent| tangent.distance),
-                places: [0, 1, 2, 3].map(|k| of(k).place),
-            }
-        });
-        blocks.collect()
-    }
-
     #[inline]
     fn each_within(&self, offset: &[Lanes; 3], limit: Lanes, mut each: impl FnMut(u32)) {
         let lower = self.distance + dot(&self.gradient, offset);
@@ -560,17 +538,23 @@ impl<'a> Collect<'a> {
         // The likeliest first.
         self.found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let scale = self.bvh.wide.frame().scale;
-        let tangents = self.found.iter().map(|&(distance, gradient, place)| Tangent {
-            gradient: gradient.to_array().map(|x| x as f32),
-            distance: (distance * scale) as f32,
-            place,
+        let tangents = self.found.chunks(4).map(|four| {
+            let of = |k: usize| four.get(k).copied().unwrap_or((f64::INFINITY, Vec3::ZERO, 0));
+            let lanes = |value: &dyn Fn((f64, Vec3, u32)) -> f64| {
+                Lanes::from([0, 1, 2, 3].map(|k| value(of(k)) as f32))
+            };
+            Tangents {
+                gradient: [0, 1, 2].map(|axis| lanes(&|(_, gradient, _)| gradient[axis])),
+                distance: lanes(&|(distance, ..)| distance * scale),
+                places: [0, 1, 2, 3].map(|k| of(k).2),
+            }
         });
-        let Self { bvh, centre, radius, .. } = self;
-        let tangents = Tangents::of(&tangents.collect::<Vec<_>>());
+        let tangents = tangents.collect();
         let gradient = self.gradient.map(|gradient| {
             let differences = self.found.iter().map(|&(_, own, _)| gradient.distance(own));
             (gradient, differences.fold(0.0, f64::max))
         });
+        let Self { bvh, centre, radius, .. } = self;
         Some(Vicinity { bvh, centre, radius, tangents, gradient })
     }
 }
