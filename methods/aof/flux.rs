@@ -111,6 +111,12 @@ const COPLANAR: f64 = 1e-7;
 const SAME: f64 = 1e-10;
 /// Bound on the rounding error of a flux, also as a number in single precision.
 const ROUNDING: f64 = 1e-6;
+/// Triangles near a sphere up to which a list of them is faster for its samples than the tree.
+pub(super) const FEW: usize = 192;
+/// As [`FEW`], where the list also serves the voxels inside, for spheres of at most [`SMALL`].
+pub(super) const MANY: usize = 768;
+/// Radius from which on a sphere has mostly more than [`MANY`] triangles near it.
+pub(super) const SMALL: f64 = 0.025;
 /// Cosine of the angle to the gradient up to which samples are measured first.
 const STEEP: f64 = 0.6;
 
@@ -154,13 +160,13 @@ impl Surface {
     /// `AOF'` through a sphere around a centre, whose closest face is `start`.
     pub fn flux(&self, sphere: &Sphere, centre: Vec3, start: u32) -> f64 {
         let foot = self.closest(centre, Some(start));
-        let near = self.near(centre, sphere.radius, &foot);
+        let near = self.near(centre, sphere.radius, &foot, FEW);
         near.flux(sphere, centre, &foot, f64::INFINITY).expect("no flux is larger")
     }
 
-    /// The surface near a ball; `foot` is the closest point to its centre. See [`TriangleBvh::vicinity`].
-    pub(super) fn near(&self, centre: Vec3, radius: f64, foot: &Closest) -> Near<'_> {
-        Near { surface: self, vicinity: self.tree.vicinity(centre, radius, foot) }
+    /// The surface near a ball, as [`TriangleBvh::vicinity`].
+    pub(super) fn near(&self, centre: Vec3, radius: f64, foot: &Closest, most: usize) -> Near<'_> {
+        Near { surface: self, vicinity: self.tree.vicinity(centre, radius, foot, most) }
     }
 }
 
@@ -171,12 +177,12 @@ pub(super) struct Near<'a> {
 }
 
 impl Near<'_> {
-    /// The surface near a ball inside this one; `foot` is the closest point to its centre.
-    pub fn within(&self, centre: Vec3, radius: f64, foot: &Closest) -> Self {
+    /// That of a ball inside this one.
+    pub fn within(&self, centre: Vec3, radius: f64, foot: &Closest, most: usize) -> Self {
         let Some(vicinity) = &self.vicinity else {
-            return self.surface.near(centre, radius, foot);
+            return self.surface.near(centre, radius, foot, most);
         };
-        Self { surface: self.surface, vicinity: vicinity.narrowed(centre, radius, foot) }
+        Self { surface: self.surface, vicinity: vicinity.narrowed(centre, radius, foot, most) }
     }
 
     /// The closest point to a point of the ball. The search is faster with a face `start` near to it.
@@ -199,9 +205,14 @@ impl Near<'_> {
     /// at most `most`; a larger one by rounding alone may be returned too.
     pub fn flux(&self, sphere: &Sphere, centre: Vec3, foot: &Closest, most: f64) -> Option<f64> {
         let count = sphere.directions.len() as f64;
+        // Samples that follow each other are neighbours, mostly with the same closest face.
+        let mut face = foot.face;
         let known = self.vicinity.as_ref().and_then(Vicinity::gradient);
-        // Where nothing is known: unit vectors differ from zero by less than 2.
-        let (gradient, spread) = known.unwrap_or((Vec3::ZERO, 2.0));
+        let Some((gradient, spread)) = known.filter(|_| most < f64::INFINITY) else {
+            let adds = sphere.directions.iter();
+            let adds = adds.map(|&n| self.contribution(sphere.radius, centre, n, &mut face));
+            return Some(adds.sum::<f64>() / count);
+        };
         // The distance to a triangle is convex, so its slope along `N` is at the sample no less than in
         // the centre, where its gradient differs from that of the closest one by at most the spread.
         let slopes: Vec<f64> = sphere.directions.iter().map(|n| gradient.dot(*n)).collect();
@@ -214,8 +225,6 @@ impl Near<'_> {
         let mut sum: f64 = slopes.iter().map(|&slope| least(slope)).sum();
         let limit = (most + ROUNDING) * count;
         let mut adds = vec![0.0; slopes.len()];
-        // Samples that follow each other are neighbours, mostly with the same closest face.
-        let mut face = foot.face;
         // Steep ones first, as they raise the sum most: outward ones of faces, inward ones of fans.
         let outward = if self.surface.is_fan(foot) { -1.0 } else { 1.0 };
         for (from, to) in [(STEEP, 2.0), (-2.0, -STEEP), (-STEEP, STEEP)] {
@@ -347,7 +356,7 @@ impl Surface {
 
     fn refined(&self, sphere: &Sphere, centre: Vec3) -> Refined {
         let own = self.closest(centre, None);
-        let near = self.near(centre, sphere.radius, &own);
+        let near = self.near(centre, sphere.radius, &own, FEW);
         let mut face = own.face;
         let mut rays = Vec::with_capacity(sphere.directions.len());
         for &normal in &sphere.directions {
@@ -474,7 +483,7 @@ mod tests {
                 if !is_inside || foot.distance < sphere.radius {
                     continue;
                 }
-                let near = surface.near(centre, sphere.radius, &foot);
+                let near = surface.near(centre, sphere.radius, &foot, FEW);
                 let flux = surface.flux(&sphere, centre, foot.face);
                 for most in [-0.4, -0.2, 0.0] {
                     let found = near.flux(&sphere, centre, &foot, most);

@@ -26,7 +26,7 @@ use medial::simplifier::RunContext;
 use medial::surface::{Closest, Side, TriMesh};
 use rayon::prelude::*;
 
-use super::flux::{Near, Sphere, Surface};
+use super::flux::{FEW, MANY, Near, SMALL, Sphere, Surface};
 use super::{AofParams, Dismiss, Start};
 use crate::Result;
 
@@ -523,10 +523,11 @@ impl Walk<'_> {
             Wanted::AtMost(most) => f64::from(most),
             _ => f64::INFINITY,
         };
+        let most_near = if finest || sphere.radius > SMALL { FEW } else { MANY };
         // The spheres of all descendants lie in that of the voxel.
         let near = (evaluate || self.wanted != Wanted::Places && !finest).then(|| match around {
-            Some(near) => near.within(centre, sphere.radius, &foot),
-            None => self.surface.near(centre, sphere.radius, &foot),
+            Some(near) => near.within(centre, sphere.radius, &foot, most_near),
+            None => self.surface.near(centre, sphere.radius, &foot, most_near),
         });
         let flux = match &near {
             Some(near) if evaluate => {

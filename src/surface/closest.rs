@@ -233,9 +233,15 @@ impl TriangleBvh {
         });
     }
 
-    /// The triangles that can be closest to a point of a ball; `None` where they are too many for
-    /// searches among them to be faster. `foot` is the closest point to the centre.
-    pub fn vicinity(&self, centre: Vec3, radius: f64, foot: &Closest) -> Option<Vicinity<'_>> {
+    /// The triangles that can be closest to a point of a ball; `None` where there are more than `most`.
+    /// `foot` is the closest point to the centre.
+    pub fn vicinity(
+        &self,
+        centre: Vec3,
+        radius: f64,
+        foot: &Closest,
+        most: usize,
+    ) -> Option<Vicinity<'_>> {
         let query = self.wide.query(centre)?;
         let mut search = Collect::new(self, centre, radius, foot);
         let limit = query.limit(search.reach);
@@ -247,9 +253,9 @@ impl TriangleBvh {
                 search.add(places.start + near.trailing_zeros());
                 near &= near - 1;
             }
-            !search.is_full()
+            search.found.len() <= most
         });
-        search.finish()
+        search.finish(most)
     }
 
     fn closest_at(&self, p: Vec3, start: u32) -> (u32, Closest) {
@@ -421,8 +427,8 @@ impl<'a> Vicinity<'a> {
         self.gradient
     }
 
-    /// That of a ball inside this one; `foot` is the closest point to its centre.
-    pub fn narrowed(&self, centre: Vec3, radius: f64, foot: &Closest) -> Option<Self> {
+    /// That of a ball inside this one, as [`TriangleBvh::vicinity`].
+    pub fn narrowed(&self, centre: Vec3, radius: f64, foot: &Closest, most: usize) -> Option<Self> {
         let mut search = Collect::new(self.bvh, centre, radius, foot);
         // As in [`Collect::add`], with the tangents in the old centre. One without a gradient is a
         // lower bound in the whole ball.
@@ -436,7 +442,7 @@ impl<'a> Vicinity<'a> {
             let apart = dot(&apart, &apart).sqrt();
             tangents.each_within(&offset, limit + apart * radius, |place| search.add(place));
         }
-        search.finish()
+        search.finish(most)
     }
 
     fn nearest(&self, mut search: Nearest<'a>) -> Nearest<'a> {
@@ -478,9 +484,6 @@ impl Tangents {
         }
     }
 }
-
-/// More triangles are searched in the tree.
-const MAX_VICINITY: usize = 768;
 
 /// Collects a [`Vicinity`].
 struct Collect<'a> {
@@ -527,12 +530,8 @@ impl<'a> Collect<'a> {
         }
     }
 
-    fn is_full(&self) -> bool {
-        self.found.len() > MAX_VICINITY
-    }
-
-    fn finish(mut self) -> Option<Vicinity<'a>> {
-        if self.is_full() {
+    fn finish(mut self, most: usize) -> Option<Vicinity<'a>> {
+        if self.found.len() > most {
             return None;
         }
         // The likeliest first.

@@ -104,11 +104,12 @@ fn a_vicinity_has_the_closest_points_of_the_tree() {
             let near = vector(&mut rng) * scale;
             let centre = if k % 5 == 0 { bvh.closest(near).point } else { near };
             let radius = scale * [0.3, 1e-2, 1e-4, 1e-9, 0.0][k % 5] * rng.random::<f64>();
-            let vicinity = bvh.vicinity(centre, radius, &bvh.closest(centre)).expect("is small");
+            let vicinity =
+                bvh.vicinity(centre, radius, &bvh.closest(centre), 400).expect("is small");
             let inner = centre + vector(&mut rng).normalize() * (0.5 * radius);
             let foot = bvh.closest(inner);
             let start = foot.face;
-            let narrowed = vicinity.narrowed(inner, 0.5 * radius, &foot).expect("is small");
+            let narrowed = vicinity.narrowed(inner, 0.5 * radius, &foot, 400).expect("is small");
             for _ in 0..10 {
                 let direction = vector(&mut rng).normalize();
                 for (vicinity, p) in [
@@ -128,7 +129,7 @@ fn a_vicinity_has_the_closest_points_of_the_tree() {
     // Of many triangles equally far away none can be left out.
     let sphere: Vec<_> = (0..2000).map(|_| [vector(&mut rng).normalize(); 3]).collect();
     let bvh = TriangleBvh::from_triangles(&sphere).unwrap();
-    assert!(bvh.vicinity(Vec3::ZERO, 0.1, &bvh.closest(Vec3::ZERO)).is_none());
+    assert!(bvh.vicinity(Vec3::ZERO, 0.1, &bvh.closest(Vec3::ZERO), 1999).is_none());
 }
 
 #[test]
