@@ -30,7 +30,7 @@ pub(crate) fn overview_table(
         if row.mean(&HAUSDORFF).is_some() {
             rows.push(row);
         } else {
-            let why: Vec<&str> = row.without.keys().map(|status| status.key()).collect();
+            let why: Vec<String> = row.without.keys().map(ToString::to_string).collect();
             missing.entry(why.join(", ")).or_default().push(&comparison.series[row.series]);
         }
     }
