@@ -75,7 +75,7 @@ pub(crate) fn overview_table(
     let edition = comparison.edition_note();
     let table = if edition.is_some() { table } else { table.without(&["frozen s"]) };
     let missing: Vec<String> =
-        missing.iter().map(|(why, names)| format!("{}: {why}", names.join(", "))).collect();
+        missing.iter().map(|(why, names)| format!("{} ({why})", names.join(", "))).collect();
     if !missing.is_empty() {
         notes.push(format!("No result at this count: {}.", missing.join("; ")));
     }

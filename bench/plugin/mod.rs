@@ -86,8 +86,8 @@ pub fn load_script(
     taken: &[&str],
 ) -> Result<(Vec<Registered>, String), PluginError> {
     let loader = loader.ok_or_else(|| {
-        let why = "Python classes need the command of the Python package; run `pip install medialaxis` and use its \
-                   `medial`, or declare a program in a TOML file";
+        let why = "Python classes need the command of the Python package; run `pip install ./python` in the \
+                   sources and use its `medial`, or declare a program in a TOML file";
         refused(path, why)
     })?;
     let bytes = check_regular(path).and_then(|()| fs::read(path));
@@ -142,7 +142,7 @@ mod tests {
         let refused = |loader: Option<&dyn ScriptLoader>| {
             load_script(&file, loader, &["qmat"]).err().expect("a refusal").to_string()
         };
-        assert!(refused(None).contains("pip install medialaxis"));
+        assert!(refused(None).contains("pip install ./python"));
         assert!(refused(Some(&Ids(&["?"]))).ends_with("mine.py: SyntaxError: line 1"));
         assert!(refused(Some(&Ids(&[]))).contains("@medial_axis.simplifier"));
         assert!(refused(Some(&Ids(&["Mine"]))).contains("lower-case"));

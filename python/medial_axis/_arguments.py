@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import operator
 import os
 from collections.abc import Callable
@@ -30,6 +31,7 @@ def call(seed: int = 0, threads: int | None = None, progress: Progress | None = 
 
 def whole(value: Any, what: str, least: int, most: int) -> int:
     """A whole number in a range."""
+    _no_truth(value, what, "a whole number")
     try:
         number = operator.index(value)
     except TypeError:
@@ -39,12 +41,21 @@ def whole(value: Any, what: str, least: int, most: int) -> int:
     return number
 
 
-def real(value: Any, what: str) -> float:
-    """A number."""
+def real(value: Any, what: str, least: float = -math.inf, most: float = math.inf) -> float:
+    """A number in a range; without one, any."""
+    _no_truth(value, what, "a number")
     try:
-        return float(value)
+        number = float(value)
     except (TypeError, ValueError, OverflowError):
         raise ParameterError(f"{what}: expected a number, found {value!r}") from None
+    if number < least or number > most:
+        raise ParameterError(f"{what} = {number}: expected {least} to {most}")
+    return number
+
+
+def _no_truth(value: Any, what: str, expected: str) -> None:
+    if isinstance(value, bool):
+        raise ParameterError(f"{what}: expected {expected}, found {value}")
 
 
 def path_text(path: Any, what: str = "path") -> str:

@@ -142,7 +142,7 @@ class Vmas(Options, total=False):
     points: Literal["auto", "vertices", "samples"]
     samples: int  # samples
     neighbours: int  # samples
-    # lambda, a word of Python: in `params`
+    lambda_: float  # pure number
     refit: Literal["published", "energy"]
     contact: Literal["samples", "mesh"]
     connect: Literal["cliques", "faces"]
@@ -152,7 +152,7 @@ class Vmas(Options, total=False):
 class Tight(Options, total=False):
     """Options of `tight`."""
 
-    # lambda, a word of Python: in `params`
+    lambda_: float  # pure number
     start: int  # spheres
     samples: int  # samples
     rounds: int  # rounds

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from . import _medial, method
 from .axis import MedialAxis
-from .errors import ParameterError
+from .errors import ParameterError, UnsupportedError
 from .method import Level, MethodInfo, Param, RunContext, Shape, Simplified
 
 #: The file that is being loaded for its classes, if any: it must not start comparisons.
@@ -100,6 +100,9 @@ def _typed(param: Param, value: Any) -> Any:
 
 def at(instance: Any, kind: str, value: float) -> Output:
     """The result of an instance at a level."""
+    info = type(instance).info
+    if kind == "native" and info.native is None or kind == "published" and info.published is None:
+        raise UnsupportedError(f"{info.id} has no {kind} level; give a number of spheres")
     levels = {
         "published": Level(),
         "spheres": Level(spheres=int(value)),

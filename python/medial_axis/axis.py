@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import keyword
 import os
 import warnings
 from collections.abc import Iterable, Mapping
@@ -174,7 +175,7 @@ class MedialAxis:
 
     @property
     def edges(self) -> IndexArray:
-        """Pairs of spheres, n x 2, sides of faces among them; sorted."""
+        """Pairs of spheres, m x 2, sides of faces among them; sorted."""
         return self._axis.edges
 
     @property
@@ -264,6 +265,8 @@ class MedialAxis:
         if not isinstance(method, (str, type)):
             without = "; only spheres=N and max_error=E have a default" if method is None else ""
             raise ParameterError(f"method: expected an id or a class, found {method!r}{without}")
+        # `lambda` is a word of Python.
+        more = {key[:-1] if keyword.iskeyword(key[:-1]) else key: value for key, value in more.items()}
         given = {**(params or {}), **more}
         id, known = id_of(method), known_params(method)
         unknown = [] if known is None else [str(key) for key in given if key not in known]
@@ -351,7 +354,7 @@ class MedialAxis:
         text = self._axis.evaluate(
             mesh._surface,
             whole(samples, "samples", 1, 2**31),
-            None if certify is None else real(certify, "certify"),
+            None if certify is None else real(certify, "certify", 1e-6, 1.0),
             call(seed, threads, progress),
         )
         return Evaluation.from_json(text, mesh=mesh.name, simplify=self.run.record if self.run else None)

@@ -96,11 +96,9 @@ def generated() -> str:
         name = "".join(word.capitalize() for word in id.split("-"))
         fields = ""
         for param in info["params"]:
-            if keyword.iskeyword(param["name"]):
-                fields += f"    # {param['name']}, a word of Python: in `params`\n"
-                continue
+            name_ = param["name"] + "_" * keyword.iskeyword(param["name"])
             kind = type_of(param)
-            fields += f"    {param['name']}: {kind}" + ("\n" if kind.startswith("Lit") else f"  # {param['unit']}\n")
+            fields += f"    {name_}: {kind}" + ("\n" if kind.startswith("Lit") else f"  # {param['unit']}\n")
         default = " | None = None" if id == DEFAULT_METHOD else ""
         head = f'\n\nclass {name}(Options, total=False):\n    """Options of `{id}`."""\n'
         parts.append(head + ("\n" + fields if fields else ""))
@@ -121,7 +119,7 @@ from medial_axis import MedialAxis, simplifier
 
 def calls(axis: MedialAxis, method: str, own: type) -> MedialAxis:
     axis = axis.simplify("qmat", spheres=100, k=1e-5, topology_from="never", seed=3)
-    axis = axis.simplify("vmas", spheres=100, contact="mesh", params={"lambda": 0.3})
+    axis = axis.simplify("vmas", spheres=100, contact="mesh", lambda_=0.3)
     axis = axis.simplify(method, level="published", params={"k": 0})
     axis = axis.simplify(own, spheres=3, anything=4).simplify(spheres=2)
     axis.simplify("qmat", sheres=3)  # wrong
