@@ -107,6 +107,30 @@ pub fn check_folder(path: &Path) -> Result<(), Failure> {
     }
 }
 
+/// Refuses an output that would replace a file that the command reads, or its other output.
+///
+/// # Errors
+/// When both paths lead to the same file.
+pub fn check_apart<'a>(
+    output: Option<&Path>,
+    others: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), Failure> {
+    let Some(output) = output else { return Ok(()) };
+    let place = |path: &Path| {
+        path.canonicalize().ok().or_else(|| {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+            let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
+            Some(folder.join(path.file_name()?))
+        })
+    };
+    let own = place(output);
+    if own.is_some() && others.into_iter().any(|other| place(other) == own) {
+        let why = "the command reads or writes this file already; name another one for the output";
+        return Err(Failure::usage(format!("{}: {why}", output.display())));
+    }
+    Ok(())
+}
+
 /// Writes a file, complete or not at all.
 ///
 /// # Errors

@@ -42,6 +42,8 @@ pub struct Store {
     pub added: usize,
     /// Remarks about the folder as it was found.
     pub remarks: Vec<String>,
+    /// Whether an incomplete last line was removed.
+    pub was_cut: bool,
 }
 
 /// The reason for which a folder cannot be used as a store.
@@ -79,13 +81,13 @@ impl Store {
         // Before anything is repaired: another process may be in the middle of a line.
         let lock = lock(dir, command)?;
         let path = dir.join(journal);
-        let (known, remarks) = read_known(&path).map_err(io_error(&path))?;
+        let (known, remarks, was_cut) = read_known(&path).map_err(io_error(&path))?;
         // Temporary files of an ended process. The lock is held, so none is in use.
         for entry in entries.iter().filter(|entry| is_temporary(entry)) {
             let _ = fs::remove_file(entry.path());
         }
         let journal = Journal::open(&path)?;
-        Ok(Self { dir: dir.to_owned(), _lock: lock, journal, known, added: 0, remarks })
+        Ok(Self { dir: dir.to_owned(), _lock: lock, journal, known, added: 0, remarks, was_cut })
     }
 
     /// The folder.
@@ -262,7 +264,7 @@ fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
 
 /// The last record of each key, and remarks on lines without a record: an incomplete last line is removed, others stay
 /// and do not count.
-fn read_known(path: &Path) -> io::Result<(HashMap<String, Record>, Vec<String>)> {
+fn read_known(path: &Path) -> io::Result<(HashMap<String, Record>, Vec<String>, bool)> {
     let bytes = match check_regular(path).and_then(|()| fs::read(path)) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Default::default()),
         bytes => bytes?,
@@ -286,7 +288,7 @@ fn read_known(path: &Path) -> io::Result<(HashMap<String, Record>, Vec<String>)>
     }
     // Lines are only added: the last one of a key replaces the earlier.
     let known = journaled.records.into_iter().map(|record| (record.key.clone(), record));
-    Ok((known.collect(), remarks))
+    Ok((known.collect(), remarks, is_torn))
 }
 
 /// The file of a medial mesh that a record names, below the folder of a store; `None` for a path that leads elsewhere.

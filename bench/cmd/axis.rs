@@ -9,7 +9,7 @@ use serde_json::json;
 
 use crate::args::{Global, MeshArgument, SubstrateArguments};
 use crate::exit::{Exit, Failure};
-use crate::files::{check_output, shape_of};
+use crate::files::{check_apart, check_output, shape_of};
 use crate::output::{StageCosts, counted, print_result};
 use crate::progress::StageLine;
 use crate::provenance::peak_bytes;
@@ -33,6 +33,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let options = arguments.substrate.shape_options()?;
     check_output(arguments.output.as_deref())?;
+    check_apart(arguments.output.as_deref(), [&*arguments.mesh])?;
     let line = StageLine::new(global.stages());
     line.at("reading");
     let mut stages = StageCosts::default();

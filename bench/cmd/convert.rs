@@ -1,5 +1,6 @@
 //! `medial convert A B`: between surface formats, or between medial mesh formats.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -14,7 +15,7 @@ use serde_json::json;
 
 use crate::args::{Global, MeshArgument};
 use crate::exit::{Exit, Failure};
-use crate::files::{SURFACES, check_extension, extension, is_medial, shape_of};
+use crate::files::{SURFACES, check_apart, check_extension, extension, is_medial, shape_of};
 use crate::output::{print_json, print_line};
 use crate::study::external::{AxisOptions, read_axis};
 
@@ -43,7 +44,12 @@ pub struct Arguments {
 /// # Errors
 /// When the input is refused, the pair of formats does not match, or the output cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
-    let (notes, vertices, faces) = if is_medial(&arguments.from)? {
+    let from = &arguments.from;
+    check_apart(
+        Some(&arguments.to),
+        [from.as_path()].into_iter().chain(arguments.look.mesh.as_deref()),
+    )?;
+    let (notes, vertices, faces) = if is_medial(from)? {
         arguments.look.check(&arguments.to)?;
         let Arguments { lenient, block, .. } = *arguments;
         let options = AxisOptions { lenient, block, ..AxisOptions::default() };
@@ -60,7 +66,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         )));
     // A medial mesh of a surface is computed, not converted.
     } else if is_only_medial(&extension(&arguments.to)) {
-        let (from, to) = (arguments.from.display(), arguments.to.display());
+        if !["builtin:", "dataset:"].iter().any(|known| from.to_string_lossy().starts_with(known)) {
+            File::open(from).map_err(|error| Failure::at(from, error))?;
+        }
+        let (from, to) = (from.display(), arguments.to.display());
         let (verb, options) = match ["ma", "vtp", "glb"].contains(&&*extension(&arguments.to)) {
             true => ("axis", ""),
             false => ("simplify", " --method cover --spheres 32"),
@@ -202,8 +211,14 @@ fn diagonal(mesh: &MedialMesh) -> f64 {
 
 /// A note on the rounding of a file with single precision.
 fn loss(to: &Path, mesh: &MedialMesh) -> Option<String> {
-    (extension(to) == "glb").then(|| {
-        let loss = single_precision_loss(mesh);
-        format!("rounded coordinates and radii to single precision, by at most {loss:.1e}")
-    })
+    match &*extension(to) {
+        "glb" => {
+            let loss = single_precision_loss(mesh);
+            Some(format!(
+                "rounded coordinates and radii to single precision, by at most {loss:.1e}"
+            ))
+        }
+        "obj" => Some("left out the radii: .obj has no place for them".to_owned()),
+        _ => None,
+    }
 }

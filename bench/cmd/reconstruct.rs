@@ -17,7 +17,7 @@ use serde_json::{Map, Value, json};
 
 use crate::args::{Global, MeshArgument, SubstrateArguments, fraction};
 use crate::exit::{Exit, Failure};
-use crate::files::{COINCIDENT, SURFACES, check_extension, check_folder, shape_of};
+use crate::files::{COINCIDENT, SURFACES, check_apart, check_extension, check_folder, shape_of};
 use crate::output::{StageCosts, counted, print_result};
 use crate::progress::StageLine;
 use crate::provenance::peak_bytes;
@@ -83,6 +83,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let Arguments { axis, output, method, mesh: of, .. } = arguments;
     check_extension(output, &SURFACES)?;
     check_folder(output)?;
+    check_apart(Some(output), axis.as_deref().into_iter().chain(of.as_deref()))?;
     match method {
         Method::Union if axis.is_none() => {
             let why = "the union requires a medial mesh; name one, or give --method power-crust";

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
-use crate::files::check_folder;
+use crate::files::{check_apart, check_folder};
 use crate::output::print_result;
 
 /// Arguments of `repair`.
@@ -45,6 +45,7 @@ enum Keep {
 /// When the surface cannot be read, is still refused after the repairs, or cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     check_folder(&arguments.output)?;
+    check_apart(Some(&arguments.output), [arguments.input.as_path()])?;
     let components = match arguments.components {
         Keep::Largest => Components::Largest,
         Keep::All => Components::All,

@@ -1,7 +1,7 @@
 //! `medial report DIR [DIR ...] [--out DIR]`: rebuilds tables, plots and page from the records of a store, or of
 //! several stores that it merges.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -58,6 +58,10 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let held = dir.is_dir().then(|| Store::open(dir, RESULTS, "medial report")).transpose()?;
     let Rebuilt { records, shown, files, mut warnings, undrawn } = rebuild(dir, registry)?;
     warnings.extend(undrawn);
+    if held.as_ref().is_some_and(|store| store.was_cut) {
+        warnings
+            .push(format!("{RESULTS}: removed an incomplete last line; its item has no record"));
+    }
     warnings.extend(notes);
     if let Some(edition) = &arguments.freeze {
         freeze(dir, &records, edition, registry)?;
@@ -72,14 +76,18 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         write_site(site, dir, &shown, &header).map_err(Failure::input)?;
     }
     drop(held);
+    // The last record of a key counts; those of older builds have none.
+    let keys: HashSet<&str> = records.iter().map(|record| &*record.key).collect();
+    let without = records.iter().filter(|record| record.key.is_empty()).count();
+    let count = keys.len() + without.saturating_sub(1);
     if global.json {
-        print_json(&json!({ "records": records.len(), "files": files }), &warnings);
+        print_json(&json!({ "records": count, "files": files }), &warnings);
     } else {
         for warning in &warnings {
             print_line(&format!("warning: {warning}"));
         }
         let page = dir.join(PAGE);
-        print_line(&format!("{} records; page: {}", records.len(), page.display()));
+        print_line(&format!("{count} records; page: {}", page.display()));
     }
     Ok(Exit::Done)
 }
@@ -197,6 +205,10 @@ fn freeze(dir: &Path, records: &[Record], to: &Path, registry: &Registry) -> Res
     // A store has the same folder for its results, which the next edition would replace.
     if to.join(RESULTS).exists() {
         return Err(Failure::at(to, "a folder of results; freeze into a folder of its own"));
+    }
+    let is_empty = fs::read_dir(to).map_or(true, |mut files| files.next().is_none());
+    if !is_empty && !to.join("edition.toml").exists() {
+        return Err(Failure::at(to, "not empty and no edition (expected a new folder)"));
     }
     let here = Provenance::here();
     let study = Study::read(&dir.join(STUDY))?;

@@ -20,7 +20,7 @@ use crate::args::{
     Global, MeasureArguments, MeshArgument, SubstrateArguments, key_value, method, params,
 };
 use crate::exit::{Exit, Failure};
-use crate::files::{check_extension, check_folder, check_output, shape_of};
+use crate::files::{check_apart, check_extension, check_folder, check_output, shape_of};
 use crate::measure::answer::{Bounds, Budget, Fault, LevelRun, answer, preparing};
 use crate::measure::search::Found;
 use crate::measure::{fill_costs, fill_result};
@@ -49,7 +49,7 @@ pub struct Arguments {
     #[arg(long, value_name = "E", value_parser = error_bound)]
     max_error: Option<f64>,
     /// Prove the error bound by a certificate instead of samples.
-    #[arg(long, requires = "max_error")]
+    #[arg(long, requires = "max_error", conflicts_with_all = ["spheres", "level"])]
     certify: bool,
     /// Set a parameter of the method; repeatable.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
@@ -76,6 +76,11 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let options = arguments.substrate.shape_options()?;
     // Errors that need no mesh are reported before it is read.
     arguments.outputs.check(entry.method())?;
+    let read: Vec<&Path> =
+        arguments.initial.iter().map(PathBuf::as_path).chain([&*arguments.mesh]).collect();
+    let Outputs { output, voxels } = &arguments.outputs;
+    check_apart(output.as_deref(), read.iter().copied().chain(voxels.as_deref()))?;
+    check_apart(voxels.as_deref(), read)?;
     let line = StageLine::new(global.stages());
     line.at("reading");
     let (input, mut shape) = shape_of(&arguments.mesh, options)?;
@@ -85,7 +90,8 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
             "no output: write the result with -o {example}, or print its figures with --json"
         )));
     }
-    let mut warnings = input.report.warnings.clone();
+    let repairs = input.report.repairs.iter().map(|repair| format!("repaired: {repair}"));
+    let mut warnings: Vec<String> = repairs.chain(input.report.warnings.iter().cloned()).collect();
     if let Some(path) = &arguments.initial {
         let (initial, notes) = read_axis(path, &shape, arguments.fitting)?.0.with_remarks();
         warnings.extend(notes);

@@ -117,8 +117,17 @@ pub fn method() -> Method<AofSettings> {
 fn prepare<'s>(shape: &'s Shape, settings: AofSettings, run: &RunContext) -> Prepared<'s> {
     settings.at(Level::Published).validate()?;
     let params = settings.at(Level::Spheres(1)).validate()?;
+    if settings.mu == Auto::Value(0.0) {
+        return Err(SimplifyError::Parameter(
+            "mu = 0: above 0 and at most 0.75, or auto".to_owned(),
+        ));
+    }
     let solid = Solid::new(shape, params, run.clone())?;
-    let base = solid.base()?;
+    let base = match solid.base() {
+        // The published level may have a lattice that fits. Other levels repeat the error.
+        Err(SimplifyError::Parameter(_)) => None,
+        base => Some(base?),
+    };
     let run = run.clone();
     Ok(Box::new(move |level: Level| {
         // The published level has a separate lattice, unless all parameters are set.
@@ -126,7 +135,10 @@ fn prepare<'s>(shape: &'s Shape, settings: AofSettings, run: &RunContext) -> Pre
             let (solid, base) = solid::published(shape, &settings, &run)?;
             return at(&solid, &base, level);
         }
-        at(&solid, &base, level)
+        match &base {
+            Some(base) => at(&solid, base, level),
+            None => at(&solid, &solid.base()?, level),
+        }
     }))
 }
 

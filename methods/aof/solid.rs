@@ -171,9 +171,17 @@ impl Solid<'_> {
         let TriedStart { resolution, betti, loss, .. } = start;
         let tally = &descent.tally;
         if tally.start == 0 {
+            let refined = if resolution == requested {
+                String::new()
+            } else {
+                format!(" (and {resolution})")
+            };
+            let remedy = match self.params.start {
+                Start::Coarse => "raise resolution, or set start=fine",
+                Start::Fine => "raise resolution",
+            };
             return Err(SimplifyError::Parameter(format!(
-                "resolution = {resolution}: the solid is thinner than a voxel everywhere; raise \
-                 resolution"
+                "resolution = {requested}{refined}: no voxel fits into the solid; {remedy}"
             )));
         }
         diagnostics.count("resolution", resolution as usize);

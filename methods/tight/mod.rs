@@ -337,6 +337,8 @@ const ALIKE: f64 = 0.93;
 /// The measured error that is aimed at, a share of the bound, and the width of the certificate, another one.
 const AIM: f64 = 0.97;
 const WIDTH: f64 = 0.01;
+/// A smaller bound, a fraction of the diagonal, is refused: no count of spheres in reach keeps it.
+const LEAST: f64 = 1e-5;
 
 /// The search for one bound.
 struct Within<'a> {
@@ -355,7 +357,7 @@ impl Within<'_> {
     /// When the bound is no length, or no state is within it.
     pub fn fewest(&self, diagnostics: &mut Diagnostics) -> Result<State> {
         let bound = self.bound;
-        level_within("error", bound, (Bound::Excluded(0.0), Bound::Excluded(f64::INFINITY)))?;
+        level_within("error", bound, (Bound::Excluded(LEAST), Bound::Excluded(f64::INFINITY)))?;
         let aim = AIM * bound;
         let limit = WATCHED * aim;
         let meshes = self.descended(limit, diagnostics)?;

@@ -74,6 +74,27 @@ fn spheres_of_a_link_are_written_read_and_measured() {
     refused(&["convert", "builtin:box:8", &at("x.csv")], 2, "--method cover --spheres 32 -o ");
 }
 
+#[test]
+fn an_output_that_the_command_reads_is_refused() {
+    let at = folder();
+    let [surface, axis, voxels] = ["s.obj", "a.ma", "v.csv"].map(&at);
+    done(&["datasets", "make", "box", "-o", &surface]);
+    let before = std::fs::read(&surface).expect("written");
+    let other = "reads or writes this file already";
+    refused(&["simplify", &surface, "-m", "qmat", "--spheres", "8", "-o", &surface], 2, other);
+    let crust = ["reconstruct", "--method", "power-crust", "--mesh", &surface, "-o", &surface];
+    refused(&crust, 2, other);
+    refused(&["repair", &surface, "-o", &surface], 2, other);
+    done(&["simplify", &surface, "-m", "qmat", "--spheres", "8", "-o", &axis]);
+    let again =
+        ["simplify", &surface, "-m", "qmat", "--spheres", "6", "--initial", &axis, "-o", &axis];
+    refused(&again, 2, other);
+    refused(&["convert", &axis, &axis], 2, other);
+    let lattice = ["simplify", &surface, "-m", "aof", "--spheres", "9", "-o", &voxels, "--voxels"];
+    refused(&[&lattice[..], &[&voxels]].concat(), 2, other);
+    assert_eq!(std::fs::read(&surface).expect("still there"), before);
+}
+
 /// A sphere of radius 0.6 in the middle of the box, whose faces are 0.5 away, and one of 0.4.
 #[test]
 fn errors_are_radii_less_depths() {

@@ -412,7 +412,13 @@ fn bad_input_is_refused_by_name() {
         ("max_memory=0", count, "max_memory = 0.0 is outside (0.0, inf)"),
         // The voxels fit, their medial mesh does not.
         ("resolution=60 max_memory=8 variant=plain", Level::Native(20.0), "resolution = 60: about"),
-        ("resolution=1 variant=plain", count, "thinner than a voxel everywhere"),
+        (
+            "resolution=1 variant=plain",
+            count,
+            "resolution = 1: no voxel fits into the solid; raise",
+        ),
+        ("resolution=1", count, "resolution = 1 (and"),
+        ("mu=0", count, "mu = 0: above 0 and at most 0.75"),
         ("mu=1", count, "mu = 1.0 is outside [0.0, 0.75]"),
         ("angle=0", count, "angle = 0.0 is outside (0.0, 90.0]"),
         ("angle=-10", count, "angle = -10.0 is outside (0.0, 90.0]"),

@@ -350,7 +350,10 @@ fn a_comparison_ends_with_one_table_of_100_columns() {
     let methods = lines[2..6].iter().map(|line| line.split(' ').next().unwrap());
     assert_eq!(methods.collect::<Vec<_>>(), ["long", "angle", "lambda", "qmat"], "{text}");
     assert!(lines[3].contains(" 0.200 ") && lines[3].ends_with("  few spheres"), "{text}");
-    assert!(text.contains("No result at this count: sat (other count); aof (timed out)."), "{text}");
+    assert!(
+        text.contains("No result at this count: sat (other count); aof (timed out)."),
+        "{text}"
+    );
     assert_eq!(text.matches("spheres, 2 meshes").count(), 1, "one count: {text}");
 }
 
