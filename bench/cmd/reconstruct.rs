@@ -373,11 +373,16 @@ pub fn fitting_surface(
 
 fn contour_error(error: ContourError, diagonal: f64) -> String {
     match error {
-        ContourError::TooFine { tolerance, most, feasible } => format!(
-            "--tolerance {} is too fine (more than {most} tetrahedra); give --tolerance {:.1e}",
-            significant(tolerance / diagonal, 4),
-            feasible / diagonal
-        ),
+        ContourError::TooFine { tolerance, most, feasible } => {
+            let (tolerance, feasible) = (tolerance / diagonal, feasible / diagonal);
+            // What is certainly feasible is often far coarser than what is.
+            let usual = if tolerance < FINE { FINE } else { 1.0 };
+            format!(
+                "--tolerance {} is too fine (more than {most} tetrahedra); give --tolerance {:.1e}",
+                significant(tolerance, 4),
+                feasible.min(usual)
+            )
+        }
         ContourError::TooThin { feasible, .. } => format!(
             "every sphere is too thin for this tolerance; give --tolerance {:.1e} for the largest",
             feasible / diagonal

@@ -22,6 +22,9 @@ use crate::output::{counted, print_result};
 use crate::progress::StageLine;
 use crate::study::external::{AxisOptions, read_axis};
 
+/// The usual distance of a reconstruction to the boundary of the union, a fraction of the diagonal.
+const TOLERANCE: f64 = 0.02;
+
 /// Arguments of `render`.
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -60,7 +63,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FRACTION", value_parser = fraction)]
     max_error: Option<f64>,
     /// Limit the distance of a reconstruction to the boundary of the union, as a fraction of the diagonal.
-    #[arg(long, value_name = "FRACTION", default_value_t = 0.02, value_parser = fraction)]
+    #[arg(long, value_name = "FRACTION", default_value_t = TOLERANCE, value_parser = fraction)]
     tolerance: f64,
     #[command(flatten)]
     fitting: AxisOptions,
@@ -351,9 +354,14 @@ impl Deviation {
     fn new(shape: &Shape, path: &Path, axis: &MedialMesh, tolerance: f64) -> Result<Self, Failure> {
         let path = path.display();
         let mesh = union_surface(axis, tolerance).map_err(|error| match error {
-            ContourError::TooFine { tolerance, feasible, .. } => Failure::usage(format!(
-                "--tolerance {tolerance} is too fine for {path}; give --tolerance {feasible:.1e}"
-            )),
+            ContourError::TooFine { tolerance, feasible, .. } => {
+                // What is certainly feasible is often far coarser than what is.
+                let usual = if tolerance < TOLERANCE { TOLERANCE } else { 1.0 };
+                Failure::usage(format!(
+                    "--tolerance {tolerance} is too fine for {path}; give --tolerance {:.1e}",
+                    feasible.min(usual)
+                ))
+            }
             ContourError::TooThin { feasible, .. } => Failure::usage(format!(
                 "--tolerance {tolerance}: every sphere of {path} is too thin; give --tolerance {feasible:.1e} for \
                  the largest"

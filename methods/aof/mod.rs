@@ -115,6 +115,10 @@ pub fn method() -> Method<AofSettings> {
 }
 
 fn prepare<'s>(shape: &'s Shape, settings: AofSettings, run: &RunContext) -> Prepared<'s> {
+    if shape.has_given_initial() {
+        let why = "it starts from no medial mesh: leave out --initial";
+        return Err(SimplifyError::unsupported(why));
+    }
     settings.at(Level::Published).validate()?;
     let params = settings.at(Level::Spheres(1)).validate()?;
     if settings.mu == Auto::Value(0.0) {
