@@ -270,6 +270,7 @@ impl Simplify {
 
 /// Seconds by the clock of an external program, next to the runner's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(expecting = "an object with the numbers `prepare` and `simplify`")]
 pub struct OwnSeconds {
     /// The method's work that does not depend on the level.
     pub prepare: Option<f64>,

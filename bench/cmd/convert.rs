@@ -16,7 +16,7 @@ use serde_json::json;
 use crate::args::{Global, MeshArgument};
 use crate::exit::{Exit, Failure};
 use crate::files::{SURFACES, check_apart, check_extension, extension, is_medial, shape_of};
-use crate::output::{print_json, print_line};
+use crate::output::{counted, print_json, print_line};
 use crate::study::external::{AxisOptions, read_axis};
 
 /// Arguments of `convert`.
@@ -89,7 +89,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         let object = json!({ "output": arguments.to, "vertices": vertices, "faces": faces });
         print_json(&object, &notes);
     } else {
-        print_line(&format!("{}: {vertices} vertices, {faces} faces", arguments.to.display()));
+        let vertices =
+            if vertices == 1 { "1 vertex".to_owned() } else { format!("{vertices} vertices") };
+        let faces = counted(faces as u64, "face");
+        print_line(&format!("{}: {vertices}, {faces}", arguments.to.display()));
         for note in notes {
             print_line(&format!("  note: {note}"));
         }

@@ -344,8 +344,9 @@ impl Solid<'_> {
         let Vec3 { x, y, z } = self.shape.normalisation().backward(place);
         diagnostics.warn(format!(
             "resolution = {resolution}: the surface at ({x:.6}, {y:.6}, {z:.6}) is {:.1} % of the \
-             diagonal away from every sphere; raise resolution or the number of spheres",
-            100.0 * distance
+             diagonal away from every sphere; raise resolution or the number of spheres{}",
+            100.0 * distance,
+            if self.params.start == Start::Coarse { ", or set start=fine" } else { "" }
         ));
     }
 }
