@@ -89,9 +89,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         let object = json!({ "output": arguments.to, "vertices": vertices, "faces": faces });
         print_json(&object, &notes);
     } else {
-        let vertices =
-            if vertices == 1 { "1 vertex".to_owned() } else { format!("{vertices} vertices") };
-        let faces = counted(faces as u64, "face");
+        let [vertices, faces] = [(vertices, "vertex"), (faces, "face")]
+            .map(|(count, noun)| counted(count as u64, noun));
         print_line(&format!("{}: {vertices}, {faces}", arguments.to.display()));
         for note in notes {
             print_line(&format!("  note: {note}"));

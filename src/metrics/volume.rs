@@ -126,7 +126,7 @@ pub(super) fn volumes_in(
         .fold(vec![root], |cells, _| cells.iter().flat_map(Cell::children).collect());
     let parts: Vec<Parts> = coarse.par_iter().map(|cell| division.difference(cell)).collect();
     let Parts { all, excess } = parts.into_iter().fold(Parts::default(), Parts::plus);
-    Ok(Volumes { error: all / volume, ratio: 1.0 + (2.0 * excess - all) / volume })
+    Ok(Volumes { error: all / volume, ratio: (1.0 + (2.0 * excess - all) / volume).max(0.0) })
 }
 
 #[derive(Clone, Copy)]
