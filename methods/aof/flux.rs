@@ -201,8 +201,8 @@ impl Near<'_> {
         }
     }
 
-    /// `AOF'` through a sphere around the centre of the ball, whose closest point is `foot`, if it is
-    /// at most `most`; a larger one by rounding alone may be returned too.
+    /// `AOF'` through a sphere around the centre of the ball, whose closest point is `foot`. None only if
+    /// it is larger than `most`.
     pub fn flux(&self, sphere: &Sphere, centre: Vec3, foot: &Closest, most: f64) -> Option<f64> {
         let count = sphere.directions.len() as f64;
         // Samples that follow each other are neighbours, mostly with the same closest face.
