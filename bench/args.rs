@@ -154,6 +154,12 @@ pub fn fraction(text: &str) -> Result<f64, String> {
     number(text, |x| x > 0.0 && x <= 1.0, "a number above 0 and at most 1")
 }
 
+/// The tolerance to advise where one is too fine. The `sufficient` one is often much larger than necessary, so the
+/// `usual` one comes first.
+pub fn larger_tolerance(tolerance: f64, sufficient: f64, usual: f64) -> f64 {
+    sufficient.min(if tolerance < usual { usual } else { 1.0 })
+}
+
 fn number(text: &str, is_wanted: fn(f64) -> bool, expected: &str) -> Result<f64, String> {
     // `f64` also reads `nan` and `inf`, with which no comparison and no search would end well.
     let number = text.parse().ok().filter(|&x: &f64| x.is_finite() && is_wanted(x));

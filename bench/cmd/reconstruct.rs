@@ -15,7 +15,7 @@ use medial_reports::significant;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::args::{Global, MeshArgument, SubstrateArguments, fraction};
+use crate::args::{Global, MeshArgument, SubstrateArguments, fraction, larger_tolerance};
 use crate::exit::{Exit, Failure};
 use crate::files::{COINCIDENT, SURFACES, check_apart, check_extension, check_folder, shape_of};
 use crate::output::{StageCosts, counted, print_result};
@@ -375,12 +375,10 @@ fn contour_error(error: ContourError, diagonal: f64) -> String {
     match error {
         ContourError::TooFine { tolerance, most, feasible } => {
             let (tolerance, feasible) = (tolerance / diagonal, feasible / diagonal);
-            // What is certainly feasible is often far coarser than what is.
-            let usual = if tolerance < FINE { FINE } else { 1.0 };
             format!(
                 "--tolerance {} is too fine (more than {most} tetrahedra); give --tolerance {:.1e}",
                 significant(tolerance, 4),
-                feasible.min(usual)
+                larger_tolerance(tolerance, feasible, FINE)
             )
         }
         ContourError::TooThin { feasible, .. } => format!(

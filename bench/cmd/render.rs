@@ -15,7 +15,7 @@ use medial_reports::render::{
 use medial_reports::significant;
 use serde_json::json;
 
-use crate::args::{Global, MeshArgument, fraction};
+use crate::args::{Global, MeshArgument, fraction, larger_tolerance};
 use crate::exit::{Exit, Failure};
 use crate::files::{self, check_extension, check_folder, shape_of};
 use crate::output::{counted, print_result};
@@ -354,14 +354,10 @@ impl Deviation {
     fn new(shape: &Shape, path: &Path, axis: &MedialMesh, tolerance: f64) -> Result<Self, Failure> {
         let path = path.display();
         let mesh = union_surface(axis, tolerance).map_err(|error| match error {
-            ContourError::TooFine { tolerance, feasible, .. } => {
-                // What is certainly feasible is often far coarser than what is.
-                let usual = if tolerance < TOLERANCE { TOLERANCE } else { 1.0 };
-                Failure::usage(format!(
-                    "--tolerance {tolerance} is too fine for {path}; give --tolerance {:.1e}",
-                    feasible.min(usual)
-                ))
-            }
+            ContourError::TooFine { tolerance, feasible, .. } => Failure::usage(format!(
+                "--tolerance {tolerance} is too fine for {path}; give --tolerance {:.1e}",
+                larger_tolerance(tolerance, feasible, TOLERANCE)
+            )),
             ContourError::TooThin { feasible, .. } => Failure::usage(format!(
                 "--tolerance {tolerance}: every sphere of {path} is too thin; give --tolerance {feasible:.1e} for \
                  the largest"

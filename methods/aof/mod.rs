@@ -121,10 +121,9 @@ fn prepare<'s>(shape: &'s Shape, settings: AofSettings, run: &RunContext) -> Pre
     }
     settings.at(Level::Published).validate()?;
     let params = settings.at(Level::Spheres(1)).validate()?;
-    if settings.mu == Auto::Value(0.0) {
-        return Err(SimplifyError::Parameter(
-            "mu = 0: above 0 and at most 0.75, or auto".to_owned(),
-        ));
+    // In the parameters of a level 0 stands for the value of the variant.
+    if let Auto::Value(mu) = settings.mu {
+        within("mu", mu, (Excluded(0.0), Included(0.75)))?;
     }
     let solid = Solid::new(shape, params, run.clone())?;
     let base = match solid.base() {
@@ -340,7 +339,6 @@ impl AofParams {
         within("d", self.d, if self.levels > 1 { 2.. } else { 0.. })?;
         let split = self.d.checked_pow(self.levels - 1).unwrap_or(u32::MAX);
         within("d^(levels - 1)", split, 0..=MAX_SPLIT)?;
-        within("mu", self.mu, 0.0..=0.75)?;
         within("max_memory", self.max_memory, (Excluded(0.0), Excluded(f64::INFINITY)))?;
         within("angle", self.angle, ANGLES)?;
         self.sample_counts()?;

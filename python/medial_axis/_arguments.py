@@ -31,7 +31,7 @@ def call(seed: int = 0, threads: int | None = None, progress: Progress | None = 
 
 def whole(value: Any, what: str, least: int, most: int) -> int:
     """A whole number in a range."""
-    _no_truth(value, what, "a whole number")
+    _refuse_bool(value, what, "a whole number")
     try:
         number = operator.index(value)
     except TypeError:
@@ -43,7 +43,7 @@ def whole(value: Any, what: str, least: int, most: int) -> int:
 
 def real(value: Any, what: str, least: float = -math.inf, most: float = math.inf) -> float:
     """A number in a range; without one, any."""
-    _no_truth(value, what, "a number")
+    _refuse_bool(value, what, "a number")
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):
@@ -53,7 +53,7 @@ def real(value: Any, what: str, least: float = -math.inf, most: float = math.inf
     return number
 
 
-def _no_truth(value: Any, what: str, expected: str) -> None:
+def _refuse_bool(value: Any, what: str, expected: str) -> None:
     if isinstance(value, bool):
         raise ParameterError(f"{what}: expected {expected}, found {value}")
 
