@@ -357,7 +357,8 @@ fn crossing(
     a.lerp(b, best.1)
 }
 
-/// A place between two at which a function of different signs there is zero, up to `enough`.
+/// A place between two at which a function of different signs there is zero, up to `enough`. `None` if the
+/// function is infinite on the way, as that of a slab is where the cones of its sides decide.
 fn root(f: impl Fn(f64) -> f64, [mut s, mut t]: [f64; 2], enough: f64) -> Option<f64> {
     let (mut low, mut high) = (f(s), f(t));
     let is_low = low < 0.0;
@@ -369,6 +370,9 @@ fn root(f: impl Fn(f64) -> f64, [mut s, mut t]: [f64; 2], enough: f64) -> Option
         let value = f(u);
         if value.abs() <= enough {
             return Some(u);
+        }
+        if !value.is_finite() {
+            return None;
         }
         if (value < 0.0) == is_low {
             (s, low, high) = (u, value, 0.5 * high);

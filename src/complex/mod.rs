@@ -24,7 +24,7 @@ pub use mesh::{Crossings, crossing_faces, faces_cross};
 pub use sheets::{Seam, SheetGraph, SheetOptions};
 pub use topology::cubical_betti;
 pub use topology::{betti, euler};
-pub use union::{MedialUnion, NearestPrimitive, Primitive, Readings, UnionError};
+pub use union::{MedialUnion, NearestPrimitive, Primitive, UnionError};
 pub use union_axis::{AxisFacet, AxisTally, UnionAxis};
 pub use voronoi::VoronoiFacets;
 pub use voronoi::{CellSpheres, DualTriangulation, voronoi_medial_mesh};

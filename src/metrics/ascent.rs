@@ -20,13 +20,16 @@
 
 use rayon::prelude::*;
 
+use super::depth::Boundary;
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::hausdorff::{BURIAL, EXPOSED};
+use super::pieces::Patches;
 use super::samples::{Pose, SEEDS, SurfaceSamples};
 use super::sweep::swept;
 use super::{DistanceOptions, MetricError};
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion};
+use crate::geometry::trees::in_morton_order;
 use crate::surface::{TriMesh, TriangleBvh};
 
 /// Seeds that are followed to the last step.
@@ -152,6 +155,11 @@ fn climb(hill: &impl Hill, arms: &[Vec3], gain: f64, (peak, near): &mut (Peak, N
 }
 
 impl Start<'_> {
+    /// All samples with their values.
+    pub fn peaks(&self) -> impl Iterator<Item = Peak> {
+        self.points.iter().zip(self.values).map(|(&point, &distance)| Peak { point, distance })
+    }
+
     /// The largest samples that are at least a step apart. Samples equal up to rounding are taken in
     /// the order of the pose's curve, which depends neither on numbering nor on orientation.
     fn pick(&self) -> Vec<Peak> {
@@ -272,30 +280,31 @@ impl<'a> PeakSearch<'a> {
         let Self { surface, tree, samples, options } = self;
         let (mesh, union) = samples.ordered(mesh)?;
         let pose = &samples.pose;
-        let mut sigma = union.signed_batch(&samples.points);
-        sigma.iter_mut().for_each(|value| *value = value.abs());
-        // Fewer seeds than for a final figure: searches are many, and the sweep adds to them.
-        let start = Start { seeds: SEEDS / 3, ..samples.start(&sigma) };
-        let on_mesh =
-            OnMesh { mesh: tree, value: |p, near: &mut usize| union.signed_from(p, near).abs() };
-        let forward = ascend(&on_mesh, &start);
+        let mut boundary = Boundary::new(&union, Patches::new(&mesh, pose.axes()), pose.diameter());
         let envelope = EnvelopeOptions {
             samples: options.envelope_samples,
             burial: BURIAL * pose.diameter(),
             seed: options.seed,
         };
         let points = sample_envelope_in(pose, &mesh, &union, &envelope)?.points;
+        let depths = in_morton_order(&samples.points, |near, p| boundary.of(p, near));
+        let depths = boundary.values(&samples.points, &depths, &points);
+        // Fewer seeds than for a final figure: searches are many, and the sweep adds to them.
+        let start = Start { seeds: SEEDS / 3, ..samples.start(&depths) };
+        let on_mesh =
+            OnMesh { mesh: tree, value: |p, near: &mut usize| boundary.estimate(p, near) };
+        let forward = ascend(&on_mesh, &start);
         let values = tree.distance_batch(&points);
         let hill = OnUnion { union: &union, surface: tree, burial: EXPOSED * pose.diameter() };
         let reverse = ascend(&hill, &Start { points: &points, values: &values, ..start });
         let mut peaks = Peaks {
-            forward: sorted(forward, &samples.points, &sigma),
+            forward: boundary.proven(sorted(forward, &samples.points, &depths)),
             reverse: sorted(reverse, &points, &values),
         };
         let known = peaks.hausdorff();
         if known < swept_below {
             let [forward, reverse] =
-                swept((surface, tree), (&mesh, &union), (&on_mesh, &hill), &start, (known, SHARE));
+                swept((surface, tree), &boundary, (&on_mesh, &hill), &start, (known, SHARE));
             peaks.forward = sorted(forward, &[], &[]).into_iter().chain(peaks.forward).collect();
             peaks.reverse = sorted(reverse, &[], &[]).into_iter().chain(peaks.reverse).collect();
         }

@@ -27,7 +27,9 @@
 
 use super::Distances;
 use super::ascent::{OnMesh, OnUnion, Peak, Start, ascend};
+use super::depth::Boundary;
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
+use super::pieces::Patches;
 use super::samples::{SEEDS, SurfaceSamples};
 use super::sweep::{FINAL_SHARE, swept};
 use crate::Vec3;
@@ -137,44 +139,49 @@ pub(super) fn distances_with_envelope(
     options: &DistanceOptions,
 ) -> Result<(Distances, Envelope), MetricError> {
     let pose = &samples.pose;
-    let readings = union.readings_batch(&samples.points);
-    let sigma: Vec<f64> = readings.iter().map(|r| r.sigma.abs()).collect();
-    let mu: Vec<f64> = readings.iter().map(|r| r.mu).collect();
-    let balls = MedialUnion::of_spheres(&mesh.spheres)?;
-    let spheres = absolute(balls.signed_batch(&samples.points));
-    let start = samples.start(&sigma);
-    let sigma_at = |p, near: &mut usize| union.signed_from(p, near).abs();
-    let epsilon_union = highest(bvh, &start, sigma_at);
-    let by_mu = Start { values: &mu, ..start };
-    let epsilon = highest(bvh, &by_mu, |p, near| union.unsigned_from(p, near));
-    // |sigma| >= mu at every point, so the maximum found for mu bounds it, too.
-    let epsilon_union = epsilon_union.max(epsilon);
-    // Fewer seeds: this figure is additional, and results are not compared by it.
-    let aside = Start { values: &spheres, seeds: SEEDS / 3, ..start };
-    let spheres_only = highest(bvh, &aside, |p, near| balls.signed_from(p, near).abs());
+    let patches = Patches::new(mesh, pose.axes());
+    let mut boundary = Boundary::new(union, patches, pose.diameter());
+    let (depths, mu): (Vec<_>, Vec<_>) = boundary.readings(&samples.points).into_iter().unzip();
     let envelope = EnvelopeOptions {
         samples: options.envelope_samples,
         burial: BURIAL * pose.diameter(),
         seed: options.seed,
     };
     let sampled = sample_envelope_in(pose, mesh, union, &envelope)?;
+    let depths = boundary.values(&samples.points, &depths, &sampled.points);
+    let balls = MedialUnion::of_spheres(&mesh.spheres)?;
+    let spheres = absolute(balls.signed_batch(&samples.points));
+    let start = samples.start(&depths);
+    let depth_at = |p, near: &mut usize| boundary.estimate(p, near);
+    let mut forward = ascend(&OnMesh { mesh: bvh, value: depth_at }, &start);
+    let by_mu = Start { values: &mu, ..start };
+    let epsilon = highest(bvh, &by_mu, |p, near| union.unsigned_from(p, near));
+    // Fewer seeds: this figure is additional, and results are not compared by it.
+    let aside = Start { values: &spheres, seeds: SEEDS / 3, ..start };
+    let spheres_only = highest(bvh, &aside, |p, near| balls.signed_from(p, near).abs());
     let on_boundary = bvh.distance_batch(&sampled.points);
     let reverse_mean = sampled.mean(&on_boundary);
     let reverse_samples = sampled.points.len();
-    let mut envelope = Envelope { points: sampled.points, distances: on_boundary };
+    let mut envelope = Envelope { points: sampled.points.clone(), distances: on_boundary };
     let hill = OnUnion { union, surface: bvh, burial: EXPOSED * pose.diameter() };
     let (points, values) = (envelope.points.as_slice(), envelope.distances.as_slice());
     let peaks = ascend(&hill, &Start { points, values, ..start });
     envelope.extend(peaks);
     let reverse = largest(&envelope.distances);
-    let on_mesh = OnMesh { mesh: bvh, value: sigma_at };
+    let on_mesh = OnMesh { mesh: bvh, value: depth_at };
+    forward.extend(start.peaks());
+    let deepest = |peaks| boundary.deepest_of(peaks).map_or(0.0, |peak| peak.distance);
+    // The distance to the boundary is at least `mu` at every point, so the maximum found for `mu` bounds it, too.
+    let epsilon_union = deepest(forward).max(epsilon);
     let known = epsilon_union.max(reverse);
     let [forward, backward] =
-        swept((surface, bvh), (mesh, union), (&on_mesh, &hill), &start, (known, FINAL_SHARE));
-    let epsilon_union = forward.iter().fold(epsilon_union, |most, peak| most.max(peak.distance));
+        swept((surface, bvh), &boundary, (&on_mesh, &hill), &start, (known, FINAL_SHARE));
+    let epsilon_union = epsilon_union.max(deepest(forward));
+    // A distance that is not a number must not pass for a small error.
+    let epsilon_union = if depths.iter().any(|d| d.is_nan()) { f64::NAN } else { epsilon_union };
     envelope.extend(backward);
     let reverse = largest(&envelope.distances);
-    let uniform = Summary::new(&sigma[..samples.uniform]);
+    let uniform = Summary::new(&depths[..samples.uniform]);
     let distances = Distances {
         epsilon,
         epsilon_union,

@@ -4,15 +4,17 @@
 
 /// Version of the definitions of all metrics. It grows by one with each change that moves a number of an
 /// [`Evaluation`] by more than 1e-9: numbers of two versions do not compare. Editions hold theirs.
-pub const DEFINITIONS: u32 = 1;
+pub const DEFINITIONS: u32 = 2;
 
 mod ascent;
 mod axis_distance;
 mod certificate;
 mod cover;
+mod depth;
 mod envelope;
 mod hausdorff;
 mod judge;
+mod pieces;
 mod samples;
 mod spikes;
 mod structure;

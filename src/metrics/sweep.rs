@@ -17,13 +17,13 @@ use std::f64::consts::TAU;
 use rayon::prelude::*;
 
 use super::ascent::{Hill, Peak, Start, ascend};
-use super::certificate::{
-    EXPOSED, Hulls, Piece, SECTORS, Side, UnionSide, burying, farthest, lateral_normal, quartered,
+use super::depth::{Boundary, DOUBT};
+use super::pieces::{
+    EXPOSED, Patches, Piece, SECTORS, burying, farthest, lateral_normal, quartered,
 };
-use super::envelope::across;
-use super::samples::Pose;
 use crate::Vec3;
-use crate::complex::{Incidence, MedialMesh, MedialUnion, Primitive};
+use crate::complex::{Incidence, MedialUnion, Primitive};
+use crate::geometry::planar_frame::PlanarFrame;
 use crate::surface::{TriMesh, TriangleBvh};
 
 /// Pieces that exceed the largest known distance by a smaller share are not divided, for a final figure.
@@ -51,17 +51,17 @@ const NARROW: f64 = 0.25;
 /// surface first.
 pub(super) fn swept(
     surface: (&TriMesh, &TriangleBvh),
-    (mesh, union): (&MedialMesh, &MedialUnion),
+    boundary: &Boundary<'_>,
     (on_mesh, on_union): (&impl Hill, &impl Hill),
     start: &Start<'_>,
     (known, share): (f64, f64),
 ) -> [Vec<Peak>; 2] {
-    let hulls = Hulls::new(mesh);
-    let side = SweptSurface { union, hulls: &hulls };
-    let triangles = (0..surface.0.faces.len()).map(|face| surface.0.triangle(face)).collect();
-    let forward = peaks_above(&side, triangles, (on_mesh, start), (known, share));
+    let side = SweptSurface { boundary };
+    let triangles = (0..surface.0.faces.len()).map(|face| (surface.0.triangle(face), None));
+    let forward = peaks_above(&side, triangles.collect(), (on_mesh, start), (known, share));
+    let forward = boundary.proven(forward);
     let known = forward.iter().fold(known, |most, peak| most.max(peak.distance));
-    let side = SweptUnion::new(start.pose, surface, mesh, (union, &hulls));
+    let side = SweptUnion::new(surface, boundary);
     let reverse = peaks_above(&side, side.pieces(), (on_union, start), (known, share));
     [forward, reverse]
 }
@@ -141,38 +141,62 @@ fn rise(gradient: Vec3, from: Vec3, corners: &[Vec3]) -> f64 {
     corners.iter().fold(0.0, |rise, &corner| f64::max(rise, gradient.dot(corner - from)))
 }
 
-/// The triangles of a surface, with `|sigma|`.
+/// The triangles of a surface, with distances to the boundary of a union.
 struct SweptSurface<'a> {
-    pub union: &'a MedialUnion,
-    pub hulls: &'a Hulls,
+    boundary: &'a Boundary<'a>,
 }
 
 impl Swept for SweptSurface<'_> {
-    type Piece = [Vec3; 3];
+    /// A triangle, and a point outside the union that was near to the triangle that it is a part of.
+    type Piece = ([Vec3; 3], Option<Vec3>);
 
-    fn bound(&self, corners: &mut [Vec3; 3], enough: f64, near: &mut Near) -> Option<Bound> {
+    fn bound(
+        &self,
+        (corners, outside): &mut Self::Piece,
+        enough: f64,
+        near: &mut Near,
+    ) -> Option<Bound> {
+        let Boundary { union, patches, .. } = self.boundary;
         let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let (deepest, attained_at) = self.union.deepest_from(centre, &mut near.place);
-        let reached = deepest.signed.abs();
-        if reached + farthest(centre, corners) <= enough {
+        let (deepest, attained_at) = union.deepest_from(centre, &mut near.place);
+        let mut depth = self.boundary.from(centre, deepest.signed, attained_at, &mut near.place);
+        if let Some(outside) = *outside
+            && deepest.signed < 0.0
+        {
+            depth = depth.with(centre, outside);
+        }
+        let reach = farthest(centre, corners);
+        if !self.boundary.is_exact(&depth) {
+            depth = self.boundary.nearer(centre, depth);
+            if depth.upper + reach > enough && depth.upper - depth.lower > DOUBT * reach {
+                depth = self.boundary.within(centre, depth, 0.5 * DOUBT * reach);
+            }
+            *outside = Some(depth.outside);
+        }
+        if depth.upper + reach <= enough {
             return None;
         }
-        let above = self.hulls.largest_over(deepest.primitive, corners);
-        let inward = attained_at.and_then(|c| (c - centre).try_normalize()).unwrap_or_default();
-        let upper = above.max(rise(inward, centre, corners) - deepest.signed);
-        (upper > enough).then_some(Bound { centre, reached, upper })
+        let above = patches.hulls.largest_over(deepest.primitive, corners);
+        // Inside, the distance grows away from the nearest point outside.
+        let (gradient, here) = match deepest.signed < 0.0 {
+            true => (centre - depth.outside, depth.upper),
+            false => (attained_at.map_or(Vec3::ZERO, |c| c - centre), -deepest.signed),
+        };
+        let upper = above.max(here + rise(gradient.normalize_or_zero(), centre, corners));
+        (upper > enough).then_some(Bound { centre, reached: depth.lower, upper })
     }
 
-    fn divide(&self, piece: &[Vec3; 3], parts: &mut Vec<[Vec3; 3]>) {
-        parts.extend(quartered(*piece, Vec3::midpoint));
+    fn divide(&self, (triangle, outside): &Self::Piece, parts: &mut Vec<Self::Piece>) {
+        parts.extend(quartered(*triangle, Vec3::midpoint).map(|part| (part, *outside)));
     }
 }
 
 /// The surfaces of all primitives, with distances from a surface.
 struct SweptUnion<'a> {
-    side: UnionSide<'a>,
+    bvh: &'a TriangleBvh,
+    triangles: Vec<PlanarFrame>,
     union: &'a MedialUnion,
-    hulls: &'a Hulls,
+    patches: &'a Patches<'a>,
     /// The ends of the edges at each sphere.
     neighbours: Vec<Vec<u32>>,
     /// The third corners of the faces at each edge.
@@ -183,18 +207,11 @@ struct SweptUnion<'a> {
 type Hinted = (Piece, Option<(u32, Primitive)>);
 
 impl<'a> SweptUnion<'a> {
-    pub fn new(
-        pose: &Pose,
-        (surface, bvh): (&TriMesh, &'a TriangleBvh),
-        mesh: &'a MedialMesh,
-        (union, hulls): (&'a MedialUnion, &'a Hulls),
-    ) -> Self {
-        let mut side = UnionSide::new(surface, bvh, mesh, union, hulls);
-        side.axes = pose.axes();
-        for frame in side.frames.iter_mut().flatten() {
-            frame.v = across(frame, side.axes);
-            frame.w = frame.u.cross(frame.v);
-        }
+    pub fn new((surface, bvh): (&TriMesh, &'a TriangleBvh), boundary: &'a Boundary<'a>) -> Self {
+        let Boundary { union, patches, .. } = boundary;
+        let mesh = patches.mesh;
+        let faces = 0..surface.faces.len();
+        let triangles = faces.map(|f| PlanarFrame::new(surface.triangle(f)).0).collect();
         let mut neighbours = vec![Vec::new(); mesh.spheres.len()];
         for &[a, b] in &mesh.edges {
             neighbours[a as usize].push(b);
@@ -207,14 +224,14 @@ impl<'a> SweptUnion<'a> {
                 opposite[*edge as usize].push(corner);
             }
         }
-        Self { side, union, hulls, neighbours, opposite }
+        Self { bvh, triangles, union, patches, neighbours, opposite }
     }
 
     /// The initial pieces. Laterals are cut where a face begins or ends to overtop them.
     pub fn pieces(&self) -> Vec<Hinted> {
-        let mut pieces = self.side.pieces();
+        let mut pieces = self.patches.pieces();
         pieces.retain(|piece| !matches!(piece, Piece::Lateral(..)));
-        for (edge, frame) in (0..).zip(&self.side.frames) {
+        for (edge, frame) in (0..).zip(&self.patches.frames) {
             let Some(frame) = frame else { continue };
             let sectors = (0..=SECTORS).map(|k| TAU * f64::from(k) / f64::from(SECTORS));
             let mut cuts: Vec<f64> = sectors.collect();
@@ -248,12 +265,12 @@ impl<'a> SweptUnion<'a> {
             Piece::Flat(_) => (0, &[]),
             Piece::Round(v, _) => (v, &self.neighbours[v as usize]),
             Piece::Lateral(e, ..) => {
-                (self.side.mesh.edges[e as usize][0], &self.opposite[e as usize])
+                (self.patches.mesh.edges[e as usize][0], &self.opposite[e as usize])
             }
         };
-        let own = self.side.sphere(sphere);
+        let own = self.patches.sphere(sphere);
         others.iter().map(move |&v| {
-            let other = self.side.sphere(v);
+            let other = self.patches.sphere(v);
             Other { way: other.centre - own.centre, growth: other.radius - own.radius }
         })
     }
@@ -281,11 +298,11 @@ impl Swept for SweptUnion<'_> {
     type Piece = Hinted;
 
     fn bound(&self, (piece, hint): &mut Hinted, enough: f64, near: &mut Near) -> Option<Bound> {
-        let (normals, count) = self.side.normals(piece);
+        let (normals, count) = self.patches.normals(piece);
         if self.is_overtopped(piece, &normals[..count]) {
             return None;
         }
-        let enclosure = self.side.enclose(piece);
+        let enclosure = self.patches.enclose(piece);
         let (centre, corners) = (enclosure.centre, enclosure.corners());
         let reach = farthest(centre, corners);
         if let Piece::Round(_, [a, b, c]) = *piece
@@ -295,10 +312,11 @@ impl Swept for SweptUnion<'_> {
             // Too large for a bound by its distance, and buried.
             return Some(Bound { centre, reached: 0.0, upper: f64::INFINITY });
         }
-        let is_buried_in = |primitive| self.hulls.largest_over(primitive, corners) < -EXPOSED;
+        let is_buried_in =
+            |primitive| self.patches.hulls.largest_over(primitive, corners) < -EXPOSED;
         // The distance to one triangle is convex, so its largest value is at a corner.
         let from_face = |face: u32| {
-            let triangle = &self.side.triangles[face as usize];
+            let triangle = &self.triangles[face as usize];
             corners.iter().map(|&c| triangle.distance_squared(c)).fold(0.0, f64::max).sqrt()
         };
         if let Some((face, primitive)) = *hint
@@ -306,8 +324,7 @@ impl Swept for SweptUnion<'_> {
         {
             return None;
         }
-        let closest =
-            self.side.bvh.closest_from(centre, hint.map_or(near.face, |(face, _)| Some(face)));
+        let closest = self.bvh.closest_from(centre, hint.map_or(near.face, |(face, _)| Some(face)));
         near.face = Some(closest.face);
         let distance = closest.distance;
         let away = (centre - closest.point).try_normalize().unwrap_or_default();
@@ -328,7 +345,7 @@ impl Swept for SweptUnion<'_> {
 
     fn divide(&self, (piece, hint): &Hinted, parts: &mut Vec<Hinted>) {
         let mut divided = Vec::with_capacity(4);
-        self.side.divide(piece, &mut divided);
+        self.patches.divide(piece, &mut divided);
         parts.extend(divided.into_iter().map(|part| (part, *hint)));
     }
 }

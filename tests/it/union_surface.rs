@@ -110,6 +110,43 @@ fn thin_parts_are_refined_and_thinner_ones_counted() {
     assert_eq!(surface::validate(&made.mesh).unwrap().components, 1);
 }
 
+/// Slabs with a small sphere: where a query leaves the part between the tangent planes, the cones decide.
+#[test]
+fn slabs_of_very_different_spheres_have_a_surface() {
+    let radii = [1e-5, 3e-4, 0.00095, 0.001, 0.0012, 0.01, 0.3, 0.9];
+    let mut slabs: Vec<[([f64; 3], f64); 3]> = vec![
+        [
+            (
+                [-0.0034932826496610354, -0.007422192861891084, -47.82930482046158],
+                2.349650261066975,
+            ),
+            ([0.0998570726496721, -0.02282878124718741, 48.31675799183425], 1.91940881112742),
+            ([-1.9999999499200638, 1.9999999499200638, 84.00269643367311], 0.0010015987220439132),
+        ],
+        [
+            ([13.005083093709928, 13.085389559631025, 12.415824077139162], 8.013541189979163),
+            ([14.957310186216880, 10.114217602964895, 21.991809397833524], 3.498571136907e-4),
+            ([11.227184339048586, 17.655569644518280, 18.621069587174105], 1.815607298918769),
+        ],
+    ];
+    for radius in radii {
+        for height in [0.02, 1.5, 4.0] {
+            let ends = [([0.0; 3], 1.0), ([10.0, 0.0, 0.0], 1.0)];
+            slabs.push([ends[0], ends[1], ([5.0, height, 0.0], radius)]);
+            slabs.push([ends[0], ([10.0, 0.0, 0.0], radius), ([5.0, height, 0.0], radius)]);
+        }
+    }
+    for slab in slabs {
+        let axis = mesh(&slab, &[], &[[0, 1, 2]]);
+        let (lo, hi) = MedialUnion::new(&axis).unwrap().bounding_box();
+        for share in [0.005, 0.011] {
+            let made = union_surface(&axis, share * lo.distance(hi)).unwrap();
+            // Parts that taper below the tolerance may be missing, but what is there is a closed surface.
+            assert!(surface::validate(&made.mesh).is_ok(), "{slab:?}");
+        }
+    }
+}
+
 #[test]
 fn loops_and_voids_of_the_union_are_those_of_the_surface() {
     let ring = |n: u32, r: f64| {

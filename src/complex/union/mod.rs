@@ -70,15 +70,6 @@ pub struct NearestPrimitive {
     pub primitive: Primitive,
 }
 
-/// The two distances of a point to a union.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Readings {
-    /// The least signed distance to a primitive.
-    pub sigma: f64,
-    /// The least distance to the surface of a primitive, buried or not.
-    pub mu: f64,
-}
-
 /// Larger coordinates and radii would overflow when squared.
 const MAX_COORDINATE: f64 = 1e150;
 
@@ -271,23 +262,6 @@ impl MedialUnion {
             let (nearest, place) = self.parts.nearest::<Unsigned>(p, *last);
             *last = place;
             nearest.signed.abs()
-        })
-    }
-
-    /// Both readings for many points, in their order, in parallel: [`signed`](Self::signed) and
-    /// [`unsigned_nearest`](Self::unsigned_nearest), in hardly more time than the dearer of the two.
-    pub fn readings_batch(&self, points: &[Vec3]) -> Vec<Readings> {
-        in_morton_order(points, |last: &mut [usize; 2], p| {
-            let (nearest, place) = self.parts.nearest::<Signed>(p, last[0]);
-            last[0] = place;
-            let sigma = nearest.signed;
-            if sigma >= 0.0 {
-                // Outside of all primitives the least distance is the least unsigned one.
-                return Readings { sigma, mu: sigma };
-            }
-            let (nearest, place) = self.parts.nearest::<Unsigned>(p, last[1]);
-            last[1] = place;
-            Readings { sigma, mu: nearest.signed.abs() }
         })
     }
 

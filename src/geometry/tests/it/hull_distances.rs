@@ -245,6 +245,31 @@ fn slabs_match_brute_force() {
     }
 }
 
+#[test]
+fn distances_to_spheres_of_any_size_are_finite() {
+    let mut rng = Pcg64::seed_from_u64(3);
+    for class in TRIPLES.into_iter().chain(PAIRS) {
+        for _ in 0..100 {
+            let mut spheres = triple(class, &mut rng);
+            for sphere in &mut spheres {
+                sphere.radius *= [0.0, 1e-9, 1e-3, 1.0, 1e3][rng.random_range(0..5)];
+            }
+            for p in queries(&spheres, &mut rng) {
+                let edge = Cone::new(spheres[0], spheres[1]).foot(p);
+                let face = Slab::new([spheres[0], spheres[1], spheres[2]]).foot(p);
+                for (signed, point) in
+                    [(edge.signed_distance, edge.point), (face.signed_distance, face.point)]
+                {
+                    assert!(signed.is_finite() && point.is_finite(), "{class}: {spheres:?} at {p}");
+                }
+                let oracle = brute_force(&spheres, p);
+                let off = (signed(&spheres, p) - oracle).abs() / scale(&spheres, p);
+                assert!(off <= 1e-12, "{class}: off by {off:e} of {oracle}: {spheres:?} at {p}");
+            }
+        }
+    }
+}
+
 fn any_class() -> impl Strategy<Value = (Spheres, Vec3, u64)> {
     let classes: Vec<(usize, &str)> =
         TRIPLES.map(|c| (3, c)).into_iter().chain(PAIRS.map(|c| (2, c))).collect();

@@ -1,0 +1,255 @@
+//! The surfaces of all primitives of a medial mesh, in pieces that are divided where bounds need it.
+//!
+//! The boundary of the union is a part of them. The pieces are tangent triangles of slabs, laterals of
+//! cones, and spherical triangles.
+
+use std::f64::consts::TAU;
+
+use super::envelope::across;
+use crate::Vec3;
+use crate::complex::{MedialMesh, Primitive};
+use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
+
+/// The primitives as whole convex bodies, unlike the parts in [`MedialUnion`].
+pub(super) struct Hulls {
+    spheres: Vec<Sphere>,
+    cones: Vec<Cone>,
+    slabs: Vec<Slab>,
+}
+
+impl Hulls {
+    pub fn new(mesh: &MedialMesh) -> Self {
+        Self {
+            spheres: mesh.spheres.clone(),
+            cones: mesh
+                .edges
+                .iter()
+                .map(|&edge| {
+                    let [a, b] = mesh.spheres_of(edge);
+                    Cone::new(a, b)
+                })
+                .collect(),
+            slabs: mesh.faces.iter().map(|&f| Slab::new(mesh.spheres_of(f))).collect(),
+        }
+    }
+
+    /// The signed distance of a point to a primitive.
+    pub fn signed(&self, primitive: Primitive, p: Vec3) -> f64 {
+        match primitive {
+            Primitive::Sphere(v) => self.spheres[v as usize].signed_distance(p),
+            Primitive::Edge(e) => self.cones[e as usize].signed_distance(p),
+            Primitive::Face(f) => self.slabs[f as usize].signed_distance(p),
+        }
+    }
+
+    /// The largest signed distance to a primitive over the convex hull of some points.
+    pub fn largest_over(&self, primitive: Primitive, corners: &[Vec3]) -> f64 {
+        // A convex function is largest over a convex hull at one of its corners.
+        corners.iter().fold(f64::NEG_INFINITY, |largest, &p| largest.max(self.signed(primitive, p)))
+    }
+}
+
+/// The distance from a point to the farthest of some others.
+pub(super) fn farthest(from: Vec3, points: &[Vec3]) -> f64 {
+    points.iter().fold(0.0, |far, &p| f64::max(far, from.distance_squared(p))).sqrt()
+}
+
+/// A triangle in four, by the midpoints of its sides.
+pub(super) fn quartered(
+    [a, b, c]: [Vec3; 3],
+    middle: impl Fn(Vec3, Vec3) -> Vec3,
+) -> [[Vec3; 3]; 4] {
+    let [d, e, f] = [middle(b, c), middle(c, a), middle(a, b)];
+    [[a, f, e], [f, b, d], [e, d, c], [d, e, f]]
+}
+
+/// A point of a primitive's surface is on the boundary of the union, up to rounding, if it is no
+/// deeper than this in any primitive.
+pub(super) const EXPOSED: f64 = 1e-12;
+
+/// The signed distance at the centre of a piece of some reach from which on a primitive buries all of it: any such
+/// primitive ends a search.
+pub(super) fn burying(reach: f64) -> f64 {
+    -(EXPOSED + reach) * (1.0 + 1e-9)
+}
+
+/// Initial parts of a cone's lateral around its axis.
+pub(super) const SECTORS: u32 = 6;
+
+/// The surfaces of all primitives of a medial mesh.
+pub(super) struct Patches<'a> {
+    pub mesh: &'a MedialMesh,
+    pub hulls: Hulls,
+    /// One for each edge; `None` where one sphere holds the other.
+    pub frames: Vec<Option<ConeFrame>>,
+    /// The axes of the octants that spheres are divided into.
+    axes: [Vec3; 3],
+}
+
+/// A part of the surface of one primitive.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Piece {
+    /// A part of a tangent triangle of a slab.
+    Flat([Vec3; 3]),
+    /// A spherical triangle: a sphere, and unit vectors towards its corners.
+    Round(u32, [Vec3; 3]),
+    /// A part of a cone's lateral: an edge, ranges of the share along the axis and of the angle
+    /// around it.
+    Lateral(u32, [f64; 2], [f64; 2]),
+}
+
+/// A point of a piece, and the corners of a convex polytope around the piece.
+pub(super) struct Enclosure {
+    pub centre: Vec3,
+    corners: [Vec3; 6],
+    count: usize,
+}
+
+impl<'a> Patches<'a> {
+    /// Divisions follow the axes, so that they turn with the shape where the axes do.
+    pub fn new(mesh: &'a MedialMesh, axes: [Vec3; 3]) -> Self {
+        let hulls = Hulls::new(mesh);
+        let frame = |cone: &Cone| {
+            cone.frame().map(|frame| {
+                let v = across(&frame, axes);
+                ConeFrame { v, w: frame.u.cross(v), ..frame }
+            })
+        };
+        let frames = hulls.cones.iter().map(frame).collect();
+        Self { mesh, hulls, frames, axes }
+    }
+
+    pub fn pieces(&self) -> Vec<Piece> {
+        let mut pieces = Vec::new();
+        let [e, f, g] = self.axes;
+        for v in 0..self.mesh.spheres.len() as u32 {
+            for signs in 0..8 {
+                // Bit `k` of `signs` chooses the half space along axis `k`: one octant each.
+                let [x, y, z] = [0, 1, 2].map(|k| if signs >> k & 1 == 0 { 1.0 } else { -1.0 });
+                pieces.push(Piece::Round(v, [x * e, y * f, z * g]));
+            }
+        }
+        for (edge, frame) in (0..).zip(&self.frames) {
+            if frame.is_some() {
+                pieces.extend((0..SECTORS).map(|k| {
+                    let sector = [k, k + 1].map(|k| TAU * f64::from(k) / f64::from(SECTORS));
+                    Piece::Lateral(edge, [0.0, 1.0], sector)
+                }));
+            }
+        }
+        for corners in &self.mesh.faces {
+            let corners = corners.map(|v| self.mesh.spheres[v as usize]);
+            if let Some(planes) = Slab::new(corners).planes() {
+                let flat = planes.normals().map(|n| corners.map(|m| m.centre + m.radius * n));
+                pieces.extend(flat.map(Piece::Flat));
+            }
+        }
+        pieces
+    }
+
+    pub fn sphere(&self, v: u32) -> Sphere {
+        self.mesh.spheres[v as usize]
+    }
+
+    /// The interpolated sphere of a cone at a share of its axis, and the cone's frame.
+    fn interpolated(&self, edge: u32, share: f64) -> (Sphere, ConeFrame) {
+        let [a, b] = self.mesh.edges[edge as usize].map(|v| self.sphere(v));
+        (a.lerp(b, share), self.frames[edge as usize].expect("laterals have a frame"))
+    }
+
+    /// The corners of a convex polytope around the normals of a curved piece, none of a flat one.
+    pub fn normals(&self, piece: &Piece) -> ([Vec3; 6], usize) {
+        let mut normals = [Vec3::ZERO; 6];
+        match *piece {
+            Piece::Flat(_) => (normals, 0),
+            Piece::Round(_, [a, b, c]) => {
+                // Between the plane of its corners and the parallel tangent plane the piece is
+                // within the cone over its corners.
+                let normal = (b - a).cross(c - a).normalize_or_zero();
+                let height = normal.dot(a).abs();
+                ([a, b, c, a / height, b / height, c / height], 6)
+            }
+            Piece::Lateral(edge, [t0, _], [from, to]) => {
+                // Around the axis, between the chord and the tangents at its ends.
+                let bulge = 1.0 / (0.5 * (to - from)).cos();
+                let (_, frame) = self.interpolated(edge, t0);
+                let rings = [(from, 1.0), (0.5 * (from + to), bulge), (to, 1.0)];
+                for (normal, (angle, lift)) in normals.iter_mut().zip(rings) {
+                    *normal = lateral_normal(&frame, angle, lift);
+                }
+                (normals, 3)
+            }
+        }
+    }
+
+    pub fn enclose(&self, piece: &Piece) -> Enclosure {
+        let (normals, count) = self.normals(piece);
+        let normals = &normals[..count];
+        match *piece {
+            Piece::Flat([a, b, c]) => Enclosure::new((a + b + c) / 3.0, [a, b, c]),
+            Piece::Round(v, [a, b, c]) => {
+                let Sphere { centre, radius } = self.sphere(v);
+                let at = |direction: Vec3| centre + radius * direction;
+                Enclosure::new(at((a + b + c).normalize()), normals.iter().map(|&n| at(n)))
+            }
+            Piece::Lateral(edge, [t0, t1], [from, to]) => {
+                let ends = [t0, t1].map(|share| self.interpolated(edge, share).0);
+                let corners = ends
+                    .into_iter()
+                    .flat_map(|end| normals.iter().map(move |&n| end.centre + end.radius * n));
+                let (middle, frame) = self.interpolated(edge, 0.5 * (t0 + t1));
+                let normal = lateral_normal(&frame, 0.5 * (from + to), 1.0);
+                Enclosure::new(middle.centre + middle.radius * normal, corners)
+            }
+        }
+    }
+
+    /// Appends pieces that together cover a piece.
+    pub fn divide(&self, piece: &Piece, parts: &mut Vec<Piece>) {
+        match *piece {
+            Piece::Flat(triangle) => {
+                parts.extend(quartered(triangle, Vec3::midpoint).map(Piece::Flat));
+            }
+            Piece::Round(v, corners) => {
+                let parts_of = quartered(corners, |a, b| (a + b).normalize());
+                parts.extend(parts_of.map(|corners| Piece::Round(v, corners)));
+            }
+            Piece::Lateral(edge, [t0, t1], [from, to]) => {
+                let [(first, _), (second, _)] = [t0, t1].map(|t| self.interpolated(edge, t));
+                let around = (to - from) * first.radius.max(second.radius);
+                // The longer direction, so that pieces stay compact and the bounds sharp.
+                if around > first.centre.distance(second.centre) {
+                    let middle = 0.5 * (from + to);
+                    let halves = [[from, middle], [middle, to]];
+                    parts.extend(halves.map(|sector| Piece::Lateral(edge, [t0, t1], sector)));
+                } else {
+                    let middle = 0.5 * (t0 + t1);
+                    let halves = [[t0, middle], [middle, t1]];
+                    parts.extend(halves.map(|shares| Piece::Lateral(edge, shares, [from, to])));
+                }
+            }
+        }
+    }
+}
+
+/// The normal of a cone's lateral at an angle, with its component across the axis multiplied by
+/// `lift`.
+pub(super) fn lateral_normal(frame: &ConeFrame, angle: f64, lift: f64) -> Vec3 {
+    let (sin, cos) = angle.sin_cos();
+    frame.normal(lift * (cos * frame.v + sin * frame.w))
+}
+
+impl Enclosure {
+    fn new(centre: Vec3, points: impl IntoIterator<Item = Vec3>) -> Self {
+        let mut enclosure = Self { centre, corners: [Vec3::ZERO; 6], count: 0 };
+        for point in points {
+            enclosure.corners[enclosure.count] = point;
+            enclosure.count += 1;
+        }
+        enclosure
+    }
+
+    pub fn corners(&self) -> &[Vec3] {
+        &self.corners[..self.count]
+    }
+}
