@@ -6,8 +6,11 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use medial::simplifier::{Level, NativeLevel, ParamInfo};
+use medial::{parser_message, quoted};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
+
+use crate::study::line_of;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -144,10 +147,7 @@ pub(super) fn read(
     taken: &[&str],
 ) -> Result<Vec<Declaration>, PluginError> {
     read_document(text, folder, taken).map_err(|(span, message)| {
-        let line = span.map(|span| {
-            let before = text.as_bytes().get(..span.start).unwrap_or_default();
-            1 + before.iter().filter(|&&byte| byte == b'\n').count()
-        });
+        let line = span.map(|span| line_of(text, &span));
         PluginError { file: file.to_owned(), line, message }
     })
 }
@@ -155,7 +155,7 @@ pub(super) fn read(
 fn read_document(text: &str, folder: &Path, taken: &[&str]) -> Result<Vec<Declaration>, Fault> {
     // The parser names the unknown key or the missing field, and its place.
     let document: Document =
-        toml::from_str(text).map_err(|error| (error.span(), error.message().to_owned()))?;
+        toml::from_str(text).map_err(|error| (error.span(), parser_message(error.message())))?;
     if document.method.is_empty() {
         return Err((None, "no method is declared; add a table [[method]]".to_owned()));
     }
@@ -181,7 +181,10 @@ pub(super) fn taken_id(id: &str) -> String {
 }
 
 pub(super) fn wrong_id(id: &str) -> String {
-    format!("invalid id (found {id:?}, expected lower-case letters, digits and inner hyphens)")
+    format!(
+        "invalid id (found {}, expected lower-case letters, digits and inner hyphens)",
+        quoted(id)
+    )
 }
 
 /// Whether a text is a valid id on the command line.
