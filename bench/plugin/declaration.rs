@@ -10,8 +10,6 @@ use medial::{parser_message, quoted};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
-use crate::study::line_of;
-
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
@@ -150,6 +148,12 @@ pub(super) fn read(
         let line = span.map(|span| line_of(text, &span));
         PluginError { file: file.to_owned(), line, message }
     })
+}
+
+/// Number of the line where a part of a text begins, from 1.
+pub(crate) fn line_of(text: &str, span: &Range<usize>) -> usize {
+    let before = text.as_bytes().get(..span.start).unwrap_or_default();
+    1 + before.iter().filter(|&&byte| byte == b'\n').count()
 }
 
 fn read_document(text: &str, folder: &Path, taken: &[&str]) -> Result<Vec<Declaration>, Fault> {

@@ -32,7 +32,7 @@ mod external;
 mod program;
 
 pub use declaration::PluginError;
-pub(crate) use declaration::is_id;
+pub(crate) use declaration::{is_id, line_of};
 pub use external::{External, OwnSeconds, ProgramPeak, SCRATCH, reach};
 pub(crate) use program::Drain;
 

@@ -18,7 +18,6 @@ pub mod registry;
 pub mod source;
 
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use medial::simplifier::Params;
@@ -28,6 +27,7 @@ use medial_reports::Target;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use crate::plugin::line_of;
 use crate::provenance::{Provenance, hex_digest};
 use crate::study::external::ExternalResult;
 use crate::study::item::{Dual, Item, Keep, Limits, Measure, MethodSpec, Noise, SceneSpec};
@@ -213,12 +213,6 @@ pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T, String> {
         let line = error.span().map(|span| format!("line {}: ", line_of(text, &span)));
         line.unwrap_or_default() + &parser_message(error.message())
     })
-}
-
-/// Number of the line where a part of a text begins, from 1.
-pub(crate) fn line_of(text: &str, span: &Range<usize>) -> usize {
-    let before = text.as_bytes().get(..span.start).unwrap_or_default();
-    1 + before.iter().filter(|&&byte| byte == b'\n').count()
 }
 
 /// Longest name of a row, in characters.
