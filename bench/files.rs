@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-use medial::complex::{READABLE, WRITABLE};
+use medial::complex::{self, MedialMesh, READABLE, WRITABLE, single_precision_loss};
 use medial::shape::{Shape, ShapeOptions};
 
 use crate::exit::Failure;
@@ -44,9 +44,32 @@ pub fn is_medial(path: &Path) -> Result<bool, Failure> {
     }
 }
 
+/// Opens a file of a user for reading.
+///
+/// # Errors
+/// When it cannot be opened, or is a pipe or device, which may never end.
+pub fn open_regular(path: &Path) -> Result<File, Failure> {
+    let file = medial::check_regular(path).and_then(|()| File::open(path));
+    file.map_err(|error| Failure::at(path, error))
+}
+
+/// A note on the part of a medial mesh that the file `path` cannot hold.
+pub fn left_out(path: &Path, mesh: &MedialMesh) -> Option<String> {
+    match &*extension(path) {
+        "glb" => {
+            let loss = single_precision_loss(mesh);
+            Some(format!(
+                "rounded coordinates and radii to single precision, by at most {loss:.1e}"
+            ))
+        }
+        "obj" => Some("left out the radii: .obj has no place for them".to_owned()),
+        _ => complex::left_out(path, mesh),
+    }
+}
+
 /// The decision of the first line that has one.
 fn any_line(path: &Path, decide: impl Fn(&[&[u8]]) -> Option<bool>) -> Result<bool, Failure> {
-    let file = File::open(path).map_err(|error| Failure::at(path, error))?;
+    let file = open_regular(path)?;
     let mut reader = BufReader::new(file).take(HEADER_LIMIT);
     let mut line = Vec::new();
     while reader.read_until(b'\n', &mut line).map_err(|error| Failure::at(path, error))? > 0 {

@@ -58,7 +58,8 @@ pub fn note(global: &Global, line: &str) {
 
 /// Prints a failure on standard error, and with `--json` as an object on standard output.
 pub fn print_failure(failure: &Failure, global: &Global) {
-    print_error(&format!("medial: {}", failure.message));
+    // One line, whatever a name in it contains.
+    print_error(&printable(&format!("medial: {}", failure.message)));
     if global.json {
         let object = json!({ "error": failure.message, "warnings": [], "version": version() });
         print_raw(&format!("{object}\n"));

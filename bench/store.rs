@@ -9,9 +9,8 @@ use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use medial_reports::{
-    Journal, JournalError, Record, Status, Target, check_regular, file_inside, parse_records,
-};
+use medial::{read_regular, read_regular_text};
+use medial_reports::{Journal, JournalError, Record, Status, Target, file_inside, parse_records};
 
 use crate::study::item::Item;
 
@@ -171,7 +170,7 @@ fn is_incomplete(record: &Record, item: &Item, retry_failed: bool) -> bool {
 /// Whether a folder has a list of records, or the lock of a run that ended before its first one.
 pub fn is_store(dir: &Path, journal: &str) -> bool {
     let lock = dir.join(LOCK);
-    let holder = check_regular(&lock).and_then(|()| fs::read_to_string(lock));
+    let holder = read_regular_text(lock);
     // Another process creates it, and then writes into it.
     let is_new = |text: &str| text.is_empty() && listed(dir).count() == 1;
     let is_ours = holder.is_ok_and(|text| text.starts_with(HOLDER) || is_new(&text));
@@ -265,7 +264,7 @@ fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
 /// The last record of each key, and remarks on lines without a record: an incomplete last line is removed, others stay
 /// and do not count.
 fn read_known(path: &Path) -> io::Result<(HashMap<String, Record>, Vec<String>, bool)> {
-    let bytes = match check_regular(path).and_then(|()| fs::read(path)) {
+    let bytes = match read_regular(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Default::default()),
         bytes => bytes?,
     };

@@ -8,7 +8,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use medial::write_atomically;
+use medial::{check_regular, parser_message, read_regular, write_atomically};
 
 use crate::record::Record;
 
@@ -45,18 +45,6 @@ impl Journal {
             .write_all(lines.as_bytes())
             .and_then(|()| self.file.sync_data())
             .map_err(|source| JournalError::Io { path: self.path.clone(), source })
-    }
-}
-
-/// Rejects anything but a regular file: reading a pipe or a device may never end. A missing file is left to the
-/// reader.
-///
-/// # Errors
-/// If the path exists and is not a regular file.
-pub fn check_regular(path: &Path) -> io::Result<()> {
-    match fs::metadata(path) {
-        Ok(target) if !target.is_file() => Err(io::Error::other("not a regular file")),
-        _ => Ok(()),
     }
 }
 
@@ -110,8 +98,8 @@ impl std::fmt::Display for BadLine {
 /// # Errors
 /// [`JournalError::Io`] when the file cannot be read.
 pub fn read_records(path: &Path) -> Result<Journaled, JournalError> {
-    let bytes = check_regular(path).and_then(|()| fs::read(path));
-    let bytes = bytes.map_err(|source| JournalError::Io { path: path.to_owned(), source })?;
+    let bytes =
+        read_regular(path).map_err(|source| JournalError::Io { path: path.to_owned(), source })?;
     Ok(parse_records(&bytes))
 }
 
@@ -127,7 +115,7 @@ pub fn parse_records(bytes: &[u8]) -> Journaled {
             Err(error) => journaled.bad_lines.push(BadLine {
                 line: index + 1,
                 torn: error.is_eof(),
-                message: error.to_string(),
+                message: parser_message(&error.to_string()),
             }),
         }
     }

@@ -47,8 +47,7 @@ mod write;
 pub use comparison::COUNT_TOLERANCE;
 pub use header::{Header, MethodNote, RunNote, Running};
 pub use journal::{
-    BadLine, Journal, JournalError, Journaled, check_regular, parse_records, read_records,
-    write_records,
+    BadLine, Journal, JournalError, Journaled, parse_records, read_records, write_records,
 };
 pub use metric::{Better, METRICS, Metric, measured_rows};
 pub use overview::{reasons, summary_text};

@@ -7,11 +7,12 @@ use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
+use medial::{parser_message, read_regular};
 
 use crate::answers::{by_bound, equal_error_table, purpose_table};
 use crate::comparison::Comparison;
 use crate::header::Header;
-use crate::journal::{check_regular, replace_file};
+use crate::journal::replace_file;
 use crate::overview::overview_table;
 use crate::page::{MeshPart, MeshView, Page, gzip};
 use crate::pictures::{FOLDER, PictureStrip, VIEWS, strips};
@@ -208,9 +209,11 @@ pub fn results_csv(records: &[Record]) -> Result<Vec<u8>, ReportError> {
 /// [`ReportError::Io`] when the file is missing or is no header.
 pub fn read_header(dir: &Path) -> Result<Header, ReportError> {
     let path = dir.join("header.json");
-    let bytes = check_regular(&path).and_then(|()| fs::read(&path));
-    (bytes.and_then(|bytes| serde_json::from_slice(&bytes).map_err(io::Error::from)))
-        .map_err(|source| ReportError::Io { path, source })
+    let read = |bytes: Vec<u8>| {
+        let header = serde_json::from_slice(&bytes);
+        header.map_err(|error| io::Error::other(parser_message(&error.to_string())))
+    };
+    read_regular(&path).and_then(read).map_err(|source| ReportError::Io { path, source })
 }
 
 /// Why a report could not be written.

@@ -42,6 +42,7 @@ mod colour;
 pub mod complex;
 mod diagnostics;
 pub mod heap;
+mod input;
 pub mod metrics;
 pub mod range_queue;
 pub mod shape;
@@ -51,6 +52,9 @@ pub mod surface;
 
 pub use atomic::{remove_temporaries, write_atomically};
 pub use colour::{ColourMap, decode_srgb};
+pub use input::{
+    check_regular, parser_message, quoted, read_regular, read_regular_text, shortened,
+};
 
 pub use geometry::Vec3;
 /// Triangulations, dual complexes, box trees, distances to sphere, cone and slab: a separate crate.

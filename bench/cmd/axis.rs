@@ -9,7 +9,7 @@ use serde_json::json;
 
 use crate::args::{Global, MeshArgument, SubstrateArguments};
 use crate::exit::{Exit, Failure};
-use crate::files::{check_apart, check_output, shape_of};
+use crate::files::{check_apart, check_output, left_out, shape_of};
 use crate::output::{StageCosts, counted, print_result};
 use crate::progress::StageLine;
 use crate::provenance::peak_bytes;
@@ -42,10 +42,12 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let mesh = shape.voronoi().map_err(|error| Failure::at(&arguments.mesh, error))?;
     line.at("counting components, loops and voids");
     let betti = complex::betti(&mesh);
+    let mut lost = None;
     if let Some(output) = &arguments.output {
         let back = shape.normalisation();
         let mesh = mesh.transformed(back.diagonal, |p| back.backward(p));
         complex::write(output, &mesh).map_err(Failure::input)?;
+        lost = left_out(output, &mesh);
     }
     // The line must be gone before the result is printed next to it.
     drop(line);
@@ -63,7 +65,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let expected = shape.expected_betti();
     let mut warnings = shape.report().warnings.clone();
     warnings.extend(shape.sampling_warning());
-    warnings.extend(arguments.output.as_ref().and_then(|path| complex::left_out(path, &mesh)));
+    warnings.extend(lost);
     if let Some(expected) = expected.filter(|&expected| expected != betti) {
         let advice = match shape.options().sampling {
             Sampling::Conforming { .. } => "",

@@ -139,6 +139,7 @@ pub fn run(
     arguments.apply_to_methods(&mut study, registry)?;
     let provenance = Provenance::here();
     let mut items = study.items(registry, &provenance)?;
+    study.external_remarks()?.iter().for_each(|remark| note(global, remark));
     let edition = Edition::of(&study)?;
     edition.iter().try_for_each(|edition| edition.check(&study, &items))?;
     if let Some(text) = &arguments.shard {
@@ -274,6 +275,9 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
         study.dataset.clear();
     }
     replace(&mut study.dataset, &arguments.dataset);
+    if !is_example {
+        study.retain_groups()?;
+    }
     // A folder: names of editions stay.
     let against = arguments.against.as_ref();
     let against = against.map(|path| if path.is_dir() { absolute(path) } else { path.clone() });

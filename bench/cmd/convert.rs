@@ -1,12 +1,9 @@
 //! `medial convert A B`: between surface formats, or between medial mesh formats.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use medial::complex::{
-    LoadedMa, Look, MedialMesh, SheetGraph, SheetOptions, SphereValues, single_precision_loss,
-};
+use medial::complex::{LoadedMa, Look, MedialMesh, SheetGraph, SheetOptions, SphereValues};
 use medial::geometry::trees::Bounds;
 use medial::shape::{Shape, ShapeOptions};
 use medial::surface::SignedDistance;
@@ -15,7 +12,9 @@ use serde_json::json;
 
 use crate::args::{Global, MeshArgument};
 use crate::exit::{Exit, Failure};
-use crate::files::{SURFACES, check_apart, check_extension, extension, is_medial, shape_of};
+use crate::files::{
+    SURFACES, check_apart, check_extension, extension, is_medial, left_out, open_regular, shape_of,
+};
 use crate::output::{counted, print_json, print_line};
 use crate::study::external::{AxisOptions, read_axis};
 
@@ -56,8 +55,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         let (loaded, look) = arguments.look.read(&arguments.from, options)?;
         complex::write_with(&arguments.to, &loaded.mesh, &look).map_err(Failure::input)?;
         let (mesh, mut notes) = loaded.with_remarks();
-        notes.extend(loss(&arguments.to, &mesh));
-        notes.extend(complex::left_out(&arguments.to, &mesh));
+        notes.extend(left_out(&arguments.to, &mesh));
         (notes, mesh.spheres.len(), mesh.faces.len())
     } else if arguments.look.is_set() {
         let from = arguments.from.display();
@@ -67,7 +65,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     // A medial mesh of a surface is computed, not converted.
     } else if is_only_medial(&extension(&arguments.to)) {
         if !["builtin:", "dataset:"].iter().any(|known| from.to_string_lossy().starts_with(known)) {
-            File::open(from).map_err(|error| Failure::at(from, error))?;
+            open_regular(from)?;
         }
         let (from, to) = (from.display(), arguments.to.display());
         let (verb, options) = match ["ma", "vtp", "glb"].contains(&&*extension(&arguments.to)) {
@@ -209,18 +207,4 @@ fn diagonal(mesh: &MedialMesh) -> f64 {
     // Without the surface the balls give the unit.
     let diagonal = (bounds.hi - bounds.lo).length();
     if diagonal > 0.0 && diagonal.is_finite() { diagonal } else { 1.0 }
-}
-
-/// A note on the rounding of a file with single precision.
-fn loss(to: &Path, mesh: &MedialMesh) -> Option<String> {
-    match &*extension(to) {
-        "glb" => {
-            let loss = single_precision_loss(mesh);
-            Some(format!(
-                "rounded coordinates and radii to single precision, by at most {loss:.1e}"
-            ))
-        }
-        "obj" => Some("left out the radii: .obj has no place for them".to_owned()),
-        _ => None,
-    }
 }

@@ -20,7 +20,7 @@ use crate::args::{
     Global, MeasureArguments, MeshArgument, SubstrateArguments, key_value, method, params,
 };
 use crate::exit::{Exit, Failure};
-use crate::files::{check_apart, check_extension, check_folder, check_output, shape_of};
+use crate::files::{check_apart, check_extension, check_folder, check_output, left_out, shape_of};
 use crate::measure::answer::{Bounds, Budget, Fault, LevelRun, answer, preparing};
 use crate::measure::search::Found;
 use crate::measure::{fill_costs, fill_result};
@@ -112,10 +112,8 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     line.at("checking the topology");
     simplify.warnings.extend(shape.sampling_warning());
     simplify.warnings.extend(topology_warnings(&simplified.mesh, &shape));
-    let output = arguments.outputs.output.as_ref();
-    warnings.extend(output.and_then(|path| complex::left_out(path, &simplified.mesh)));
     line.at("writing");
-    arguments.outputs.write(&simplified, &shape)?;
+    warnings.extend(arguments.outputs.write(&simplified, &shape)?);
     drop(line);
     if global.json {
         let mut object = serde_json::to_value(&simplify).map_err(Failure::input)?;
@@ -347,20 +345,22 @@ impl Outputs {
         self.output.is_none() && self.voxels.is_none()
     }
 
-    /// Writes the requested files.
+    /// Writes the requested files. Returns a note on lost parts of the result.
     ///
     /// # Errors
     /// When a file cannot be written.
-    fn write(&self, result: &Simplified, shape: &Shape) -> Result<(), Failure> {
+    fn write(&self, result: &Simplified, shape: &Shape) -> Result<Option<String>, Failure> {
+        let mut note = None;
         if let Some(path) = &self.output {
             let back = shape.normalisation();
             let mesh = result.mesh.transformed(back.diagonal, |p| back.backward(p));
             complex::write(path, &mesh).map_err(Failure::input)?;
+            note = left_out(path, &mesh);
         }
         if let (Some(path), Some(voxels)) = (&self.voxels, result.extras.get::<LatticeVoxels>()) {
             write_voxels(path, voxels, shape)?;
         }
-        Ok(())
+        Ok(note)
     }
 
     /// A line for each written file.

@@ -6,6 +6,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use medial::simplifier::{Level, NativeLevel, ParamInfo};
+use medial::{parser_message, quoted};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
@@ -144,18 +145,21 @@ pub(super) fn read(
     taken: &[&str],
 ) -> Result<Vec<Declaration>, PluginError> {
     read_document(text, folder, taken).map_err(|(span, message)| {
-        let line = span.map(|span| {
-            let before = text.as_bytes().get(..span.start).unwrap_or_default();
-            1 + before.iter().filter(|&&byte| byte == b'\n').count()
-        });
+        let line = span.map(|span| line_of(text, &span));
         PluginError { file: file.to_owned(), line, message }
     })
+}
+
+/// Number of the line where a part of a text begins, from 1.
+pub(crate) fn line_of(text: &str, span: &Range<usize>) -> usize {
+    let before = text.as_bytes().get(..span.start).unwrap_or_default();
+    1 + before.iter().filter(|&&byte| byte == b'\n').count()
 }
 
 fn read_document(text: &str, folder: &Path, taken: &[&str]) -> Result<Vec<Declaration>, Fault> {
     // The parser names the unknown key or the missing field, and its place.
     let document: Document =
-        toml::from_str(text).map_err(|error| (error.span(), error.message().to_owned()))?;
+        toml::from_str(text).map_err(|error| (error.span(), parser_message(error.message())))?;
     if document.method.is_empty() {
         return Err((None, "no method is declared; add a table [[method]]".to_owned()));
     }
@@ -181,7 +185,10 @@ pub(super) fn taken_id(id: &str) -> String {
 }
 
 pub(super) fn wrong_id(id: &str) -> String {
-    format!("invalid id (found {id:?}, expected lower-case letters, digits and inner hyphens)")
+    format!(
+        "invalid id (found {}, expected lower-case letters, digits and inner hyphens)",
+        quoted(id)
+    )
 }
 
 /// Whether a text is a valid id on the command line.

@@ -20,11 +20,10 @@
 //!
 //! Where the command runs inside an interpreter, classes can stand in for programs: [`load_script`].
 
-use std::fs;
 use std::path::Path;
 
 use medial::simplifier::Registered;
-use medial_reports::check_regular;
+use medial::{read_regular, read_regular_text};
 
 use crate::provenance::hex_digest;
 
@@ -33,7 +32,7 @@ mod external;
 mod program;
 
 pub use declaration::PluginError;
-pub(crate) use declaration::is_id;
+pub(crate) use declaration::{is_id, line_of};
 pub use external::{External, OwnSeconds, ProgramPeak, SCRATCH, reach};
 pub(crate) use program::Drain;
 
@@ -43,7 +42,7 @@ pub(crate) use program::Drain;
 /// When the file cannot be read or is wrong, with the line and advice, or when an id is among `taken`,
 /// the ids of the known methods.
 pub fn load(path: &Path, taken: &[&str]) -> Result<Vec<External>, PluginError> {
-    let text = check_regular(path).and_then(|()| fs::read_to_string(path));
+    let text = read_regular_text(path);
     let text = text.map_err(|why| refused(path, format!("cannot be read: {why}")))?;
     parse(path, &text, taken)
 }
@@ -90,7 +89,7 @@ pub fn load_script(
                    sources and use its `medial`, or declare a program in a TOML file";
         refused(path, why)
     })?;
-    let bytes = check_regular(path).and_then(|()| fs::read(path));
+    let bytes = read_regular(path);
     let bytes = bytes.map_err(|error| refused(path, error))?;
     let methods = loader.load(path).map_err(|why| refused(path, why))?;
     if methods.is_empty() {
@@ -114,6 +113,8 @@ pub fn load_script(
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use medial::simplifier::{MethodInfo, SimplifyError, simple};
 
     use super::*;

@@ -5,13 +5,13 @@
 //! the seed, the sampling of the start, and the version of the metrics' definitions.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use medial::metrics::{DEFINITIONS, Evaluation, JudgeOptions};
+use medial::read_regular;
 use medial::surface::Sampling;
 use medial_reports::editions::{DESCRIPTION, EDITIONS, Embedded, RECORDS, unpack};
-use medial_reports::{COUNT_TOLERANCE, Record, Target, check_regular, significant};
+use medial_reports::{COUNT_TOLERANCE, Record, Target, significant};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -19,7 +19,7 @@ use crate::provenance::hex_digest;
 use crate::study::item::{Dual, Item};
 use crate::study::registry::INITIAL;
 use crate::study::source::did_you_mean;
-use crate::study::{Study, VOLUME_DEPTH};
+use crate::study::{Study, VOLUME_DEPTH, parse_toml};
 
 /// The description of an edition: `edition.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -202,16 +202,15 @@ impl Edition {
             None => {
                 let read = |of: &str| {
                     let path = name.join(of);
-                    let bytes = check_regular(&path).and_then(|()| fs::read(path));
-                    bytes.map_err(|error| failed(of, error.to_string()))
+                    read_regular(path).map_err(|error| failed(of, error.to_string()))
                 };
                 let text = String::from_utf8(read(DESCRIPTION)?);
                 let text = text.map_err(|error| failed(DESCRIPTION, error.to_string()))?;
                 (text, read(RECORDS)?)
             }
         };
-        let wrong = |error: toml::de::Error| failed(DESCRIPTION, error.to_string());
-        let description: Description = toml::from_str(&text).map_err(wrong)?;
+        let description: Description =
+            parse_toml(&text).map_err(|message| failed(DESCRIPTION, message))?;
         let (name, found) = (description.name.clone(), hex_digest(&packed));
         if found != description.sha256 {
             let expected = description.sha256;

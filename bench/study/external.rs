@@ -1,9 +1,9 @@
 //! External results: files and folders of a user as results of a named method.
 //!
 //! A file is a pseudo-method: it has one result with its number of spheres on its mesh, evaluated like all others.
-//! A folder holds `MESH.ma` or `MESH-COUNT.ma` for the meshes of the study, and may hold `method.toml` with the
-//! claims of its authors. A surface instead of a medial mesh is the decimation baseline. Everything but the claimed
-//! seconds is measured here.
+//! A folder holds `MESH.ma` or `MESH-COUNT.ma`, or another format, for the meshes of the study, and may hold
+//! `method.toml` with the claims of its authors. Folders come from others: links that lead out of them are refused.
+//! A surface instead of a medial mesh is the decimation baseline. Everything but the claimed seconds is measured here.
 
 use std::collections::{BTreeMap, HashSet};
 use std::fmt::Display;
@@ -18,14 +18,14 @@ use medial::simplifier::{
     SimplifyError,
 };
 use medial::surface::Side;
-use medial::{complex, surface};
-use medial_reports::{COUNT_TOLERANCE, Target, check_regular, significant};
+use medial::{complex, quoted, read_regular, read_regular_text, shortened, surface};
+use medial_reports::{COUNT_TOLERANCE, Target, significant};
 use serde::{Deserialize, Serialize};
 
 use crate::plugin::{OwnSeconds, reach};
 use crate::provenance::{Provenance, hex_digest};
 use crate::study::item::{Item, MethodSpec, SceneSpec};
-use crate::study::{Study, StudyError};
+use crate::study::{Study, StudyError, parse_toml};
 
 /// Id of the pseudo-method.
 pub const GIVEN: &str = "given";
@@ -109,16 +109,18 @@ impl Claims {
         let seconds = self.seconds.iter().find(|(_, s)| !(s.is_finite() && **s >= 0.0));
         if let Some((name, value)) = seconds {
             return Some(format!(
-                "seconds of {name}: {value} is no time (expected a number from 0)"
+                "seconds of {}: {value} is no time (expected a number from 0)",
+                quoted(name)
             ));
         }
         let entry = self.bibtex.trim();
-        let depth = entry.chars().try_fold(0_usize, |depth, c| match c {
-            '{' => Some(depth + 1),
-            '}' => depth.checked_sub(1),
-            _ => Some(depth),
+        // The depth of braces is 0 again at the last one alone: a second entry follows no other.
+        let mut depth = 0_usize;
+        let end = entry.char_indices().find(|&(_, c)| {
+            depth = if c == '{' { depth + 1 } else { depth - usize::from(c == '}' && depth > 0) };
+            c == '}' && depth == 0
         });
-        let is_entry = entry.starts_with('@') && entry.ends_with('}') && depth == Some(0);
+        let is_entry = entry.starts_with('@') && end.is_some_and(|(at, _)| at + 1 == entry.len());
         (!entry.is_empty() && !is_entry)
             .then(|| "bibtex: expected one entry @type{key, ...} with balanced braces".to_owned())
     }
@@ -130,33 +132,48 @@ const CLAIMS: &str = "method.toml";
 const LARGEST_CLAIMS: u64 = 100_000;
 const LARGEST_IN_FOLDER: u64 = 4_000_000;
 const LARGEST_RESULT: u64 = 200_000_000;
-/// Extensions of external results.
-const EXTENSIONS: [&str; 5] = ["ma", "ply", "off", "obj", "stl"];
+/// Extensions of surfaces that are external results, besides those of medial meshes.
+const SURFACES: [&str; 2] = ["off", "stl"];
+
+/// The content of a folder of results.
+struct Folder {
+    files: Vec<ExternalResult>,
+    claims: Claims,
+    /// Names of the other entries.
+    skipped: Vec<String>,
+}
+
+/// Refuses a link of a folder that leads out of it: an error would quote a file of the reader, and a report show it.
+fn check_inside(folder: &Path, file: &Path) -> Result<(), String> {
+    if !file.is_symlink() {
+        return Ok(());
+    }
+    match (fs::canonicalize(folder), fs::canonicalize(file)) {
+        (Ok(folder), Ok(target)) if target.starts_with(&folder) => Ok(()),
+        _ => Err(format!(
+            "{}: a link that leads out of the folder; put the file there",
+            file.display()
+        )),
+    }
+}
 
 impl ExternalResult {
     fn refused(&self, why: impl Display) -> StudyError {
         StudyError::Value(format!("given `{}`: {why}", self.name))
     }
 
-    /// The files of a folder with the names of their meshes, and the claims. Skips files without a mesh in the study.
+    /// The files of a folder with the names of their meshes, its claims, and the files without a mesh in the study.
     ///
     /// # Errors
-    /// When the folder or its claims cannot be read, or no file belongs to a mesh.
-    pub fn in_folder(
-        &self,
-        folder: &Path,
-        meshes: &[String],
-    ) -> Result<(Vec<Self>, Claims), String> {
+    /// When the folder or its claims cannot be read, a link leads out of it, or no file belongs to a mesh.
+    fn in_folder(&self, folder: &Path, meshes: &[String]) -> Result<Folder, String> {
         let failed = |error: io::Error| format!("{}: {error}", folder.display());
         let path = folder.join(CLAIMS);
-        let read = check_regular(&path).and_then(|()| {
-            check_size(&path, LARGEST_CLAIMS).map_err(io::Error::other)?;
-            fs::read_to_string(&path)
-        });
+        check_inside(folder, &path)?;
+        let read = check_size(&path, LARGEST_CLAIMS).map_err(io::Error::other);
+        let read = read.and_then(|()| read_regular_text(&path));
         let claims: Claims = match read {
-            Ok(text) => {
-                toml::from_str(&text).map_err(|why| format!("{}: {why}", path.display()))?
-            }
+            Ok(text) => parse_toml(&text).map_err(|why| format!("{}: {why}", path.display()))?,
             // Claims are optional, but a file that is there must be readable.
             Err(error) if error.kind() == io::ErrorKind::NotFound => Claims::default(),
             Err(error) => return Err(format!("{}: {error}", path.display())),
@@ -164,7 +181,7 @@ impl ExternalResult {
         if let Some(fault) = claims.fault() {
             return Err(format!("{}: {fault}", path.display()));
         }
-        let mut files = Vec::new();
+        let (mut files, mut skipped) = (Vec::new(), Vec::new());
         for entry in fs::read_dir(folder).map_err(failed)? {
             let file = entry.map_err(failed)?.path();
             let extension = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -177,15 +194,22 @@ impl ExternalResult {
             });
             // A study may have both `box` and `box-8`: the longest name wins.
             let mesh = belonging.max_by_key(|mesh| mesh.len());
-            if let Some(mesh) = mesh.filter(|_| EXTENSIONS.contains(&extension.as_str())) {
+            let is_result =
+                complex::READABLE.iter().chain(&SURFACES).any(|known| *known == extension);
+            if let Some(mesh) = mesh.filter(|_| is_result) {
+                check_inside(folder, &file)?;
                 // Folders come from others: a single file must not take all memory.
                 check_size(&file, LARGEST_IN_FOLDER)
                     .map_err(|why| format!("{}: {why} in a folder", file.display()))?;
                 files.push(Self { file, mesh: Some(mesh.clone()), ..self.clone() });
+            } else if file != path {
+                let name = file.file_name().unwrap_or_default().to_string_lossy();
+                skipped.push(shortened(&name));
             }
         }
         // The order of a directory differs between systems.
         files.sort_by(|a, b| a.file.cmp(&b.file));
+        skipped.sort();
         if files.is_empty() {
             let known = meshes.join(", ");
             return Err(format!(
@@ -193,7 +217,7 @@ impl ExternalResult {
                 folder.display()
             ));
         }
-        Ok((files, claims))
+        Ok(Folder { files, claims, skipped })
     }
 }
 
@@ -243,7 +267,7 @@ medial::parameters! {
 /// SHA-256 of the file that some parameters name; `None` where it cannot be read.
 pub fn fingerprint(params: &Params) -> Option<String> {
     let file = params.0.get("file")?.as_str()?;
-    std::fs::read(file).ok().map(|bytes| hex_digest(&bytes))
+    read_regular(file).ok().map(|bytes| hex_digest(&bytes))
 }
 
 /// The pseudo-method.
@@ -326,9 +350,9 @@ impl Study {
         for given in &self.given {
             let folder = self.resolved(&given.file);
             if folder.is_dir() {
-                let (found, claims) =
+                let Folder { files, claims, .. } =
                     given.in_folder(&folder, meshes).map_err(|why| given.refused(why))?;
-                all.extend(found.into_iter().map(|given| (given, claims.clone())));
+                all.extend(files.into_iter().map(|given| (given, claims.clone())));
             } else {
                 all.push((given.clone(), Claims::default()));
             }
@@ -357,6 +381,35 @@ impl Study {
             files[file].params.same_as = names.join(", ");
         }
         Ok(files)
+    }
+
+    /// A remark on each folder of results with files that are no results on a mesh of the study.
+    ///
+    /// # Errors
+    /// When a folder is refused.
+    pub fn external_remarks(&self) -> Result<Vec<String>, StudyError> {
+        /// Names that a remark lists.
+        const LISTED: usize = 10;
+        let mut remarks = Vec::new();
+        for given in &self.given {
+            let folder = self.resolved(&given.file);
+            if !folder.is_dir() {
+                continue;
+            }
+            let meshes = crate::study::unique_names(&self.sources()?);
+            let found = given.in_folder(&folder, &meshes).map_err(|why| given.refused(why))?;
+            let mut names = found.skipped;
+            let more = if names.len() > LISTED { ", ..." } else { "" };
+            names.truncate(LISTED);
+            if !names.is_empty() {
+                remarks.push(format!(
+                    "{}: skipped files that are no result of a mesh of the study in a known format ({}{more})",
+                    folder.display(),
+                    names.join(", ")
+                ));
+            }
+        }
+        Ok(remarks)
     }
 
     fn read_result(
@@ -442,7 +495,7 @@ fn mesh_of(given: &ExternalResult, meshes: &[String]) -> Result<String, StudyErr
     let message = match (&given.mesh, meshes) {
         (Some(mesh), _) if meshes.contains(mesh) => return Ok(mesh.clone()),
         (Some(mesh), _) => {
-            let known = meshes.join(", ");
+            let (mesh, known) = (shortened(mesh), meshes.join(", "));
             format!("given `{name}`: unknown mesh `{mesh}` (expected one of: {known})")
         }
         (None, [mesh]) => return Ok(mesh.clone()),
@@ -685,7 +738,7 @@ fn doubts(
     );
     if !is_fitted {
         let fit = shape.fit(mesh)?;
-        if fit.misfit.is_some_and(|misfit| misfit <= DOUBTFUL) {
+        if fit.is_needed {
             let found = percent(fit.misfit.unwrap_or_default());
             return Ok(Some(format!(
                 "{differ}, by {found} in other units ({}; {}); convert them by --fit similarity",

@@ -22,9 +22,12 @@ use std::path::{Path, PathBuf};
 
 use medial::simplifier::Params;
 use medial::surface::{self, Sampling};
-use medial_reports::{Target, check_regular};
+use medial::{parser_message, quoted, read_regular_text, shortened};
+use medial_reports::Target;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use crate::plugin::line_of;
 use crate::provenance::{Provenance, hex_digest};
 use crate::study::external::ExternalResult;
 use crate::study::item::{Dual, Item, Keep, Limits, Measure, MethodSpec, Noise, SceneSpec};
@@ -201,6 +204,20 @@ impl Default for Study {
     }
 }
 
+/// Reads a TOML text.
+///
+/// # Errors
+/// The problem in one line with its line number, and with little of the text.
+pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T, String> {
+    toml::from_str(text).map_err(|error| {
+        let line = error.span().map(|span| format!("line {}: ", line_of(text, &span)));
+        line.unwrap_or_default() + &parser_message(error.message())
+    })
+}
+
+/// Longest name of a row, in characters.
+const LONGEST_NAME: usize = 100;
+
 impl Study {
     /// Reads a study file. Relative paths in it start at its folder.
     ///
@@ -208,9 +225,9 @@ impl Study {
     /// [`StudyError::File`], with the line where the text is at fault.
     pub fn read(path: &Path) -> Result<Self, StudyError> {
         let failed = |message: String| StudyError::File { path: path.to_owned(), message };
-        let text = check_regular(path).and_then(|()| std::fs::read_to_string(path));
-        let text = text.map_err(|error| failed(error.to_string()))?;
-        let mut study: Self = toml::from_str(&text).map_err(|error| failed(error.to_string()))?;
+        let text = read_regular_text(path).map_err(|error| failed(error.to_string()))?;
+        let mut study: Self = parse_toml(&text).map_err(failed)?;
+        study.check_names().map_err(failed)?;
         let own = path.parent().filter(|own| !own.as_os_str().is_empty());
         // The parent of `study.toml` is empty and has no absolute path.
         let own = own.unwrap_or(Path::new("."));
@@ -236,12 +253,34 @@ impl Study {
         }
     }
 
+    /// Refuses names that tables and messages cannot show.
+    fn check_names(&self) -> Result<(), String> {
+        let methods = self.methods.iter().filter_map(|method| method.name.as_ref());
+        let given = self.given.iter().map(|given| &given.name);
+        let groups =
+            self.groups.iter().flat_map(|(group, meshes)| [group].into_iter().chain(meshes));
+        let is_shown = |name: &&String| {
+            !name.trim().is_empty()
+                && name.chars().count() <= LONGEST_NAME
+                && !name.contains(char::is_control)
+        };
+        match methods.chain(given).chain(groups).find(|name| !is_shown(name)) {
+            None => Ok(()),
+            Some(name) => Err(format!(
+                "invalid name (found {}, expected 1 to {LONGEST_NAME} characters without control characters)",
+                quoted(name)
+            )),
+        }
+    }
+
     /// Refuses implausible values.
     ///
     /// # Errors
     /// [`StudyError::Value`] for the first of them.
     pub fn check(&self) -> Result<(), StudyError> {
         let counts = self.methods.iter().filter_map(|method| method.spheres.as_ref());
+        let mut levels = (self.methods.iter())
+            .flat_map(|method| method.levels.iter().map(move |level| (&method.id, level)));
         let mut paths = (self.meshes.iter().chain(&self.plugins).chain(&self.folder))
             .chain(self.given.iter().map(|given| &given.file))
             .chain(&self.against);
@@ -261,6 +300,8 @@ impl Study {
             format!("--jobs {}: expected a number from 1 to {MOST_JOBS}", self.jobs)
         } else if let Some(width) = self.certify.filter(|width| !(1e-6..1.0).contains(width)) {
             format!("--certify {width}: expected a fraction of the diagonal from 1e-6 to 1")
+        } else if let Some((id, level)) = levels.find(|(_, level)| !level.is_finite()) {
+            format!("--levels {}={level}: expected a finite number", shortened(id))
         } else if self.memory == Some(0) {
             "--memory 0: expected a positive number of megabytes".to_owned()
         } else if let Some(eta) = self.noise.iter().find(|&&eta| !(eta > 0.0 && eta <= 0.1)) {
@@ -324,7 +365,7 @@ pub enum StudyError {
 /// The message for an unknown method, with the known ids.
 pub fn no_such_method(id: &str, known: &[String]) -> String {
     let meant = did_you_mean(id, known.iter().map(String::as_str));
-    format!("unknown method `{id}`{meant} (expected one of: {})", known.join(", "))
+    format!("unknown method `{}`{meant} (expected one of: {})", shortened(id), known.join(", "))
 }
 
 impl Study {
@@ -404,6 +445,7 @@ impl Study {
         let sources = self.sources()?;
         let names = unique_names(&sources);
         let files = self.external_files(&names)?;
+        self.check_groups(&names)?;
         let mut items = Vec::new();
         for (source, mesh) in sources.iter().zip(names) {
             // Without loading it: a refused file is a row of the results, not an error of the study.
@@ -427,7 +469,7 @@ impl Study {
                 },
             };
             let noisy = self.noise.iter().map(|&eta| {
-                let mesh = format!("{} noise {eta}", scene.mesh);
+                let mesh = noisy(&scene.mesh, eta);
                 let noise = Some(Noise { eta, seed: self.seed });
                 SceneSpec { mesh, noise, ..scene.clone() }
             });
@@ -448,6 +490,41 @@ impl Study {
             items.extend(of_mesh.map(|file| self.external_item(scene.clone(), file, here)));
         }
         Ok(items)
+    }
+
+    /// The names of all meshes, clean and with noise.
+    fn mesh_names(&self, names: &[String]) -> Vec<String> {
+        let noisy =
+            self.noise.iter().flat_map(|&eta| names.iter().map(move |name| noisy(name, eta)));
+        names.iter().cloned().chain(noisy).collect()
+    }
+
+    /// Leaves out of the groups the meshes that other ones replace.
+    ///
+    /// # Errors
+    /// As [`Study::sources`].
+    pub fn retain_groups(&mut self) -> Result<(), StudyError> {
+        let known = self.mesh_names(&unique_names(&self.sources()?));
+        self.groups.values_mut().for_each(|meshes| meshes.retain(|mesh| known.contains(mesh)));
+        self.groups.retain(|_, meshes| !meshes.is_empty());
+        Ok(())
+    }
+
+    /// Refuses groups with meshes that the study does not have.
+    fn check_groups(&self, names: &[String]) -> Result<(), StudyError> {
+        let known = self.mesh_names(names);
+        for (group, meshes) in &self.groups {
+            if let Some(mesh) = meshes.iter().find(|mesh| !known.contains(mesh)) {
+                let meant = did_you_mean(mesh, known.iter().map(String::as_str));
+                return Err(StudyError::Value(format!(
+                    "group {}: unknown mesh {}{meant} (expected one of: {})",
+                    quoted(group),
+                    quoted(mesh),
+                    known.join(", ")
+                )));
+            }
+        }
+        Ok(())
     }
 
     fn item(
@@ -552,6 +629,11 @@ pub fn shard(text: &str, items: &[Item]) -> Result<Vec<Item>, StudyError> {
         }
     }
     Ok(own)
+}
+
+/// The name of a mesh with noise.
+fn noisy(mesh: &str, eta: f64) -> String {
+    format!("{mesh} noise {eta}")
 }
 
 /// Names that differ in case alone are one file on some systems.

@@ -8,10 +8,11 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
+use medial::{parser_message, read_regular_text};
 use serde::{Deserialize, Serialize};
 
 use crate::comparison::row_name;
-use crate::journal::{check_regular, replace_file};
+use crate::journal::replace_file;
 use crate::metric::median;
 use crate::record::{Machine, Record, Stages, Status};
 use crate::text::printable;
@@ -143,7 +144,7 @@ impl Run {
         let path = folder.join(self.file_name());
         let failed = |error: io::Error| HistoryError::file(&path, error);
         let text = serde_json::to_string(self).map_err(|error| failed(error.into()))? + "\n";
-        match check_regular(&path).and_then(|()| fs::read_to_string(&path)) {
+        match read_regular_text(&path) {
             Ok(old) if old == text => return Ok((path, false)),
             Ok(_) => {
                 let message =
@@ -158,10 +159,9 @@ impl Run {
     }
 
     fn read(path: &Path) -> Result<Self, HistoryError> {
-        let text = check_regular(path).and_then(|()| fs::read_to_string(path));
-        let text = text.map_err(|error| HistoryError::file(path, error))?;
-        let run: Self =
-            serde_json::from_str(&text).map_err(|error| HistoryError::file(path, error))?;
+        let text = read_regular_text(path).map_err(|error| HistoryError::file(path, error))?;
+        let run: Self = serde_json::from_str(&text)
+            .map_err(|error| HistoryError::file(path, parser_message(&error.to_string())))?;
         let Self { date, commit, .. } = &run;
         // Long enough to have a file name.
         let is_named = date.len() >= 10 && commit.len() >= 8;

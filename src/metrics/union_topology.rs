@@ -6,12 +6,17 @@
 //! The primitives are replaced by balls at a given spacing. The Betti numbers are those of the dual
 //! complex of the balls, which are exact for the balls (Edelsbrunner 1995). The surface of the balls
 //! lies below that of a cone of radius `r` by up to about `spacing^2 / (8 r)`, of a slab by twice
-//! that. So contacts shallower than this are missed, but a gap never counts as a contact. Where a primitive
-//! is thinner than the balls are apart, they do not even touch: [`union_betti`] counts each then.
+//! that. So contacts shallower than this are missed. Balls smaller than 0.7 spacings are enlarged to that, or the balls
+//! of one thin primitive would not touch: the corner of a box, where the radius is 0, would be a component. A gap counts
+//! as a contact only next to such a ball.
 
 use super::MetricError;
 use crate::complex::{MedialMesh, UnionError};
 use crate::geometry::{DualComplex, Sphere};
+
+/// Least radius of a ball, in spacings. Circles of this radius around the corners cover every triangle of neighbours: of
+/// sides of one spacing (0.58), and between a row of a face and the balls of its side (0.67).
+const LEAST_RADIUS: f64 = 0.7;
 
 /// Bound on the number of balls.
 const MAX_BALLS: usize = 5_000_000;
@@ -59,6 +64,10 @@ fn balls(mesh: &MedialMesh, spacing: f64) -> Result<Vec<Sphere>, MetricError> {
             balls.extend((1..i).map(|j| from.lerp(to, f64::from(j) / f64::from(i))));
         }
     }
+    // A sphere without an edge has no neighbours of its own.
+    let mut least = vec![LEAST_RADIUS * spacing; balls.len()];
+    mesh.isolated().into_iter().for_each(|sphere| least[sphere as usize] = 0.0);
+    balls.iter_mut().zip(least).for_each(|(ball, least)| ball.radius = ball.radius.max(least));
     Ok(balls)
 }
 
@@ -111,8 +120,25 @@ mod tests {
         assert_eq!(union_betti(&chain(&horseshoe, 0.4), 0.02).unwrap(), [1, 1, 0]);
         let apart = MedialMesh::from_simplices(chain(&horseshoe, 0.3).spheres, vec![], vec![]);
         assert_eq!(union_betti(&apart.unwrap(), 0.02).unwrap(), [5, 0, 0]);
-        // Thinner than the balls are apart.
-        assert!(union_betti(&chain(&horseshoe, 1e-6), 0.02).unwrap()[0] > 100);
+    }
+
+    /// Parts thinner than the balls are apart, such as the corners of a box.
+    #[test]
+    fn a_connected_mesh_has_a_connected_union_at_any_radius() {
+        let ball = |x: f64, y: f64, radius| Sphere::new(Vec3::new(x, y, 0.0), radius);
+        for radius in [0.0, 1e-6, 0.005, 0.01, 0.013, 0.02, 0.1] {
+            let horseshoe = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0], [0.0, 0.7]];
+            assert_eq!(union_betti(&chain(&horseshoe, radius), 0.02).unwrap(), [1, 0, 0]);
+            // A sheet whose corners are points or balls.
+            for middle in [radius, 0.3] {
+                let corners = [[0.0, 0.0], [1.37, 0.0], [1.21, 1.13], [0.1, 0.8]]
+                    .map(|[x, y]| ball(x, y, radius));
+                let spheres = corners.into_iter().chain([ball(0.61, 0.47, middle)]).collect();
+                let faces = vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [0, 3, 4]];
+                let sheet = MedialMesh::from_simplices(spheres, vec![], faces).unwrap();
+                assert_eq!(union_betti(&sheet, 0.02).unwrap(), [1, 0, 0], "{radius} {middle}");
+            }
+        }
     }
 
     #[test]

@@ -5,20 +5,21 @@
 //! distance of its centre to the surface, as the median over the spheres, so that the few spheres that a coarse
 //! simplification has inflated do not matter.
 //!
-//! A similarity `p -> scale p + shift` is sought in three ways, and the best is kept: known conventions of tools, the
-//! bounding boxes, and from there the least mean of `|D(c) - r|` over scale and shift, `D` the signed distance, by
-//! Gauss-Newton steps on iteratively reweighted squares. A convention that fits nearly as well as the optimum is
-//! preferred: it is exact, the optimum follows the errors of the medial mesh.
+//! A similarity `p -> scale p + shift` is sought in four ways: known conventions of tools and factors between units, the
+//! bounding boxes, and from there the least mean of `|D(c) - r|` over the scale alone and over scale and shift, `D` the
+//! signed distance, by Gauss-Newton steps on iteratively reweighted squares. The fewest free parameters win where they fit
+//! nearly as well, or leave the union as near to the surface: a convention is exact, the optimum follows the errors of the
+//! medial mesh. [`Fit::uncertainty`] estimates these.
 
 use std::fmt;
 use std::sync::Arc;
 
-use glam::{DMat4, DVec4};
+use glam::{BVec3, DMat4, DVec4};
 use rayon::prelude::*;
 
 use super::{Shape, ShapeError};
 use crate::Vec3;
-use crate::complex::{MedialMesh, Sphere};
+use crate::complex::{MedialMesh, MedialUnion, Sphere};
 use crate::surface::{InsideTest, Normalisation, Side, TriangleBvh};
 
 /// A change of units: every length times `scale`, then a shift.
@@ -73,7 +74,11 @@ pub enum FitSource {
     ToOne,
     /// A cube from -1 to 1 around the middle.
     Around,
-    /// Nothing known: bounding boxes, or the least misfit.
+    /// A factor between common units, such as millimetres and inches, without a shift.
+    Factor,
+    /// The scale of the least misfit, without a shift.
+    Scaled,
+    /// The scale and the shift of the least misfit.
     Fitted,
 }
 
@@ -84,6 +89,8 @@ impl fmt::Display for FitSource {
             Self::ToTen => "out of a cube from 0 to 10, as MATFP writes",
             Self::ToOne => "out of a cube from 0 to 1, as VMAS writes",
             Self::Around => "out of a cube from -1 to 1",
+            Self::Factor => "a factor between units, no shift",
+            Self::Scaled => "by least misfit without a shift",
             Self::Fitted => "by least misfit",
         })
     }
@@ -101,12 +108,27 @@ pub struct Fit {
     pub misfit_before: Option<f64>,
     /// The same after the similarity.
     pub misfit: Option<f64>,
+    /// How much of an error the fit can be, as a fraction of the diagonal: the largest displacement of the surface's bounding box
+    /// between this similarity and that of every other sphere alone, and at least the misfit. 0 for conventions and factors,
+    /// which are exact.
+    pub uncertainty: f64,
+    /// Whether the mesh has the wrong units without doubt: it fits with the similarity, to 1 % of the diagonal at the median
+    /// (5 % for conventions and factors), and its union comes at least twice as near to the surface.
+    #[serde(skip)]
+    pub is_needed: bool,
 }
 
 impl fmt::Display for Fit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { similarity, source, misfit_before, misfit } = self;
+        let Self { similarity, source, misfit_before, misfit, uncertainty, .. } = self;
         write!(f, "{similarity} ({source})")?;
+        if *uncertainty > 0.0 {
+            write!(
+                f,
+                "; the fit is uncertain by about {:.3} % of the diagonal",
+                100.0 * uncertainty
+            )?;
+        }
         let (Some(before), Some(after)) = (misfit_before, misfit) else { return Ok(()) };
         let [before, after] = [before, after].map(|misfit| 100.0 * misfit);
         write!(
@@ -119,8 +141,18 @@ impl fmt::Display for Fit {
 /// Median misfits, as fractions of the diagonal: from here on other units are tried.
 const DOUBTFUL: f64 = 0.01;
 
-/// Not more spheres than these are looked at, evenly taken from the list.
+/// Largest median misfit of needed units that are exact: without a free parameter, they fit no other surface by chance.
+const FITTING: f64 = 0.05;
+
+/// Most spheres and points of the surface for a fit, evenly taken from their lists.
 const SPHERES: usize = 4000;
+const POINTS: usize = 1000;
+
+/// Factors between units of length: metres, centimetres, inches, decimetres or centimetres and millimetres, feet and inches.
+const FACTORS: [f64; 5] = [1000.0, 100.0, 25.4, 10.0, 12.0];
+
+/// How many times nearer to the surface a similarity must bring the union to be needed.
+const NEARER: f64 = 2.0;
 
 /// Steps of the optimisation; far fewer are needed where there is an optimum to be found.
 const STEPS: usize = 60;
@@ -152,34 +184,50 @@ impl Shape {
     pub fn fit(&self, mesh: &MedialMesh) -> Result<Fit, ShapeError> {
         let surface = Surface::of(self)?;
         let spheres = surface.spheres(mesh);
-        let boxes = (FitSource::Fitted, surface.by_boxes(&spheres));
-        let mut candidates: Vec<(f64, FitSource, Similarity)> = surface
-            .conventions()
-            .into_iter()
-            .chain([boxes])
-            .map(|(source, s)| (surface.mean(&spheres, &s), source, s))
-            .collect();
-        let start = candidates.iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("the first one").2;
-        let optimum = surface.optimised(&spheres, start);
-        // The last candidate, that of the boxes, is only a start for the optimum.
-        candidates.pop();
-        let least = surface.mean(&spheres, &optimum);
-        // A convention is exact, the optimum follows the errors of the mesh: one that is nearly as
-        // good is preferred.
-        let enough = f64::max(PREFERENCE * least, CLOSE / optimum.scale);
-        let (_, source, normal) = candidates
-            .into_iter()
-            .filter(|(of_known, ..)| *of_known <= enough)
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .unwrap_or((least, FitSource::Fitted, optimum));
+        let mean = |s: &Similarity| surface.mean(&spheres, s);
+        let boxes = surface.by_boxes(&spheres);
+        let exact: Vec<_> = surface.conventions().into_iter().chain(surface.factors()).collect();
+        // Starts without a shift, and all.
+        let plain = [surface.without_shift(boxes.scale)].into_iter();
+        let plain =
+            plain.chain(exact.iter().filter(|(source, _)| source.has_no_shift()).map(|e| e.1));
+        let all = exact.iter().map(|e| e.1).chain([boxes]);
+        let least = |starts: &mut dyn Iterator<Item = Similarity>| {
+            let starts = starts.map(|s| (mean(&s), s));
+            starts.min_by(|a, b| a.0.total_cmp(&b.0)).expect("the first one").1
+        };
+        let scaled = surface.optimised(&spheres, least(&mut plain.into_iter()), FitSource::Scaled);
+        let start = least(&mut all.chain([scaled]));
+        let optimum = surface.optimised(&spheres, start, FitSource::Fitted);
+        // The fewest free parameters of those that fit nearly as well as the optimum, or leave the union as near.
+        let enough = f64::max(PREFERENCE * mean(&optimum), CLOSE / optimum.scale);
+        let nearness = surface.nearness(mesh);
+        let near = nearness.of(&optimum);
+        let best = exact.into_iter().map(|(source, s)| (nearness.of(&s), source, s));
+        let best = best.filter(|(of_known, _, s)| *of_known <= near || mean(s) <= enough);
+        let best = best.min_by(|a, b| a.0.total_cmp(&b.0)).or_else(|| {
+            let of_scaled = nearness.of(&scaled);
+            let is_enough = of_scaled <= near || mean(&scaled) <= enough;
+            is_enough.then_some((of_scaled, FitSource::Scaled, scaled))
+        });
+        let (after, source, normal) = best.unwrap_or((near, FitSource::Fitted, optimum));
         let [before, misfit] = [&Similarity::IDENTITY, &normal]
             .map(|s| median(&surface.residuals(&spheres, s)).unwrap_or(0.0));
-        let similarity = surface.in_input_units(&normal);
-        Ok(Fit { similarity, source, misfit_before: Some(before), misfit: Some(misfit) })
+        let is_free = matches!(source, FitSource::Scaled | FitSource::Fitted);
+        let is_needed = misfit <= if is_free { DOUBTFUL } else { FITTING }
+            && after.is_finite()
+            && NEARER * after <= nearness.of(&Similarity::IDENTITY);
+        Ok(Fit {
+            similarity: surface.in_input_units(&normal),
+            source,
+            misfit_before: Some(before),
+            misfit: Some(misfit),
+            uncertainty: surface.uncertainty(&spheres, &normal, source, misfit),
+            is_needed,
+        })
     }
 
-    /// The similarity of [`Shape::fit`] where one is needed and helps: the medial mesh fits with it, to 1 % of the diagonal at
-    /// the median, and does not as it is.
+    /// The similarity of [`Shape::fit`] where [`Fit::is_needed`], for a mesh that does not fit to 1 % as it is.
     ///
     /// # Errors
     /// When the surface has no face.
@@ -187,8 +235,7 @@ impl Shape {
         if self.misfit(mesh)?.is_some_and(|misfit| misfit <= DOUBTFUL) {
             return Ok(None);
         }
-        let fit = self.fit(mesh)?;
-        Ok(fit.misfit.is_some_and(|misfit| misfit <= DOUBTFUL).then_some(fit))
+        Ok(Some(self.fit(mesh)?).filter(|fit| fit.is_needed))
     }
 
     /// The similarity for points without radii: that convention of a tool which brings nearly all of them into the solid, the
@@ -210,7 +257,8 @@ impl Shape {
             fitting.reduce(|best, other| if other.1.scale > best.1.scale { other } else { best });
         Ok(best.map(|(source, normal)| {
             let similarity = surface.in_input_units(&normal);
-            Fit { similarity, source, misfit_before: None, misfit: None }
+            let (misfit, uncertainty) = (None, 0.0);
+            Fit { similarity, source, misfit_before: None, misfit, uncertainty, is_needed: true }
         }))
     }
 
@@ -232,6 +280,8 @@ struct Surface {
     units: Normalisation,
     lower: Vec3,
     upper: Vec3,
+    /// Some vertices and centres of faces.
+    points: Vec<Vec3>,
 }
 
 impl Surface {
@@ -240,7 +290,13 @@ impl Surface {
         let view = shape.view();
         let (lower, upper) = shape.mesh().bounding_box().unwrap_or_default();
         let (tree, inside) = (view.surface_tree()?, view.inside_test());
-        Ok(Self { tree, inside, units: *shape.normalisation(), lower, upper })
+        let mesh = shape.mesh();
+        let centre = |face| mesh.triangle(face).into_iter().sum::<Vec3>() / 3.0;
+        let every = |count: usize| (2 * count).div_ceil(POINTS).max(1);
+        let vertices = mesh.vertices.iter().copied().step_by(every(mesh.vertices.len()));
+        let centres = (0..mesh.faces.len()).step_by(every(mesh.faces.len())).map(centre);
+        let points = vertices.chain(centres).collect();
+        Ok(Self { tree, inside, units: *shape.normalisation(), lower, upper, points })
     }
 
     /// Spheres of a file, evenly taken, in normalised coordinates as if the file were in input units.
@@ -270,6 +326,49 @@ impl Surface {
             (FitSource::ToOne, out_of(1.0, self.lower)),
             (FitSource::Around, out_of(2.0, middle)),
         ]
+    }
+
+    /// Factors between units, in both directions.
+    fn factors(&self) -> impl Iterator<Item = (FitSource, Similarity)> {
+        let scales = FACTORS.into_iter().flat_map(|factor| [factor, 1.0 / factor]);
+        scales.map(|scale| (FitSource::Factor, self.without_shift(scale)))
+    }
+
+    /// A scale of input units in normalised coordinates.
+    fn without_shift(&self, scale: f64) -> Similarity {
+        Similarity { scale, shift: self.units.origin / self.units.diagonal * (scale - 1.0) }
+    }
+
+    /// The distances of points of the surface to the union of a medial mesh in input units.
+    fn nearness(&self, mesh: &MedialMesh) -> Nearness<'_> {
+        let units = self.units;
+        let normal = mesh.transformed(1.0 / units.diagonal, |p| units.forward(p));
+        Nearness { union: MedialUnion::new(&normal).ok(), points: &self.points }
+    }
+
+    /// [`Fit::uncertainty`] of a similarity.
+    fn uncertainty(
+        &self,
+        spheres: &[Sphere],
+        found: &Similarity,
+        source: FitSource,
+        misfit: f64,
+    ) -> f64 {
+        if !matches!(source, FitSource::Scaled | FitSource::Fitted) {
+            return 0.0;
+        }
+        let corners: Vec<Vec3> = (0..8)
+            .map(|k| {
+                Vec3::select(BVec3::new(k & 1 > 0, k & 2 > 0, k & 4 > 0), self.upper, self.lower)
+            })
+            .collect();
+        let displacement = |first: usize| {
+            let half: Vec<Sphere> = spheres.iter().skip(first).step_by(2).copied().collect();
+            let other = self.optimised(&half, *found, source);
+            let moved = |&p: &Vec3| p.distance(other.point((p - found.shift) / found.scale));
+            corners.iter().map(moved).fold(0.0, f64::max)
+        };
+        misfit.max(displacement(0)).max(displacement(1))
     }
 
     /// From the box around the spheres to the box around the surface.
@@ -305,11 +404,11 @@ impl Surface {
         (sign * closest.distance - sphere.radius, sign * away)
     }
 
-    /// The least mean of `|D(c) - r|` near a similarity.
-    fn optimised(&self, spheres: &[Sphere], start: Similarity) -> Similarity {
+    /// The least mean of `|D(c) - r|` near a similarity, for `source` with or without a shift.
+    fn optimised(&self, spheres: &[Sphere], start: Similarity, source: FitSource) -> Similarity {
         let (mut best, mut least) = (start, self.mean(spheres, &start));
         for _ in 0..STEPS {
-            let Some(step) = self.step(spheres, &best) else { break };
+            let Some(step) = self.step(spheres, &best, source) else { break };
             // The mean is not smooth: half the step, and half of that, may be better than the whole.
             let tried = (0..8).map(|k| best.moved(step * 0.5_f64.powi(k)));
             let better = tried
@@ -327,7 +426,8 @@ impl Surface {
     }
 
     /// The Gauss-Newton step of shift and scale for squares that are weighted to stand for absolute values.
-    fn step(&self, spheres: &[Sphere], at: &Similarity) -> Option<DVec4> {
+    // Without a shift, the scale moves the points away from the origin of the input units.
+    fn step(&self, spheres: &[Sphere], at: &Similarity, source: FitSource) -> Option<DVec4> {
         let rows: Vec<(f64, DVec4)> = spheres
             .par_iter()
             .map(|sphere| {
@@ -353,7 +453,13 @@ impl Surface {
         }
         let trace = (0..4).map(|i| hessian.col(i)[i]).sum::<f64>();
         let damped = hessian + DMat4::IDENTITY * (1e-12 * trace);
-        let step = -(damped.inverse() * gradient);
+        let step = match source {
+            FitSource::Scaled => {
+                let along = (self.units.origin / self.units.diagonal).extend(1.0);
+                -along * (along.dot(gradient) / along.dot(damped * along))
+            }
+            _ => -(damped.inverse() * gradient),
+        };
         step.is_finite().then_some(step)
     }
 
@@ -364,6 +470,30 @@ impl Surface {
             scale: normal.scale,
             shift: origin + normal.shift * diagonal - origin * normal.scale,
         }
+    }
+}
+
+impl FitSource {
+    fn has_no_shift(self) -> bool {
+        matches!(self, Self::Units | Self::Factor)
+    }
+}
+
+/// The union of a medial mesh, and points of the surface.
+struct Nearness<'a> {
+    /// `None` for a mesh without a union.
+    union: Option<MedialUnion>,
+    points: &'a [Vec3],
+}
+
+impl Nearness<'_> {
+    /// The mean distance of the points to the boundary of the union after a similarity.
+    fn of(&self, similarity: &Similarity) -> f64 {
+        let Some(union) = &self.union else { return f64::INFINITY };
+        let back = |&p: &Vec3| (p - similarity.shift) / similarity.scale;
+        let points: Vec<Vec3> = self.points.iter().map(back).collect();
+        let sum: f64 = union.signed_batch(&points).into_iter().map(f64::abs).sum();
+        sum * similarity.scale / points.len().max(1) as f64
     }
 }
 
@@ -442,6 +572,57 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn factors_and_scales_are_found_without_a_shift() {
+        let (shape, axis) = block();
+        let scales = FACTORS.into_iter().flat_map(|factor| [factor, 1.0 / factor]);
+        let factors = scales.map(|scale| (scale, FitSource::Factor, 1e-12));
+        let others = [180.0, 0.37, 3.1].map(|scale| (scale, FitSource::Scaled, 0.005));
+        for (scale, source, tolerance) in factors.chain(others) {
+            let written = axis.transformed(1.0 / scale, |p| p / scale);
+            let fit = shape.fit(&written).unwrap();
+            assert_eq!((fit.source, fit.is_needed), (source, true), "{scale}: {fit:?}");
+            assert!((fit.similarity.scale / scale - 1.0).abs() < tolerance, "{scale}: {fit:?}");
+            assert!(fit.similarity.shift.length() < 1e-9, "{scale}: {fit:?}");
+            let is_exact = source == FitSource::Factor;
+            assert!(fit.uncertainty < 0.01 && (fit.uncertainty == 0.0) == is_exact, "{fit:?}");
+            let parts: Vec<f64> = (axis.spheres.iter().zip(&fit.similarity.mesh(&written).spheres))
+                .map(|(a, b)| a.centre.distance(b.centre) / shape.normalisation().diagonal)
+                .collect();
+            assert!(
+                parts.iter().all(|&off| off <= 2.0 * fit.uncertainty + 1e-12),
+                "{scale}: {fit:?}"
+            );
+        }
+    }
+
+    /// One ball around a long bar, as the poles of few samples give: no unit brings it nearer.
+    #[test]
+    fn a_coarse_mesh_in_the_right_units_has_no_others() {
+        let bar = cuboid(Vec3::ZERO, Vec3::new(100.0, 4.0, 4.0));
+        let report = validate(&bar).unwrap();
+        let options =
+            ShapeOptions { sampling: "vertices".parse().unwrap(), ..ShapeOptions::default() };
+        let shape = Shape::new("bar", &bar, report, options).unwrap();
+        let normal = *shape.normalisation();
+        let initial = shape.initial().unwrap().transformed(normal.diagonal, |p| normal.backward(p));
+        assert!(shape.misfit(&initial).unwrap().unwrap() > 0.4);
+        assert_eq!(shape.fit_if_needed(&initial).unwrap(), None);
+        assert_eq!(shape.fit(&initial).unwrap().source, FitSource::Units);
+    }
+
+    /// Spheres that are too large by 1.5 % of the diagonal, as after a coarse simplification.
+    #[test]
+    fn a_coarse_mesh_has_the_units_of_a_factor() {
+        let (shape, mut axis) = block();
+        let diagonal = shape.normalisation().diagonal;
+        axis.spheres.iter_mut().for_each(|sphere| sphere.radius += 0.015 * diagonal);
+        let written = axis.transformed(1000.0, |p| p * 1000.0);
+        let fit = shape.fit_if_needed(&written).unwrap().expect("other units");
+        assert_eq!(fit.source, FitSource::Factor, "{fit:?}");
+        assert!((fit.similarity.scale - 0.001).abs() < 1e-15 && fit.misfit.unwrap() > DOUBTFUL);
     }
 
     #[test]

@@ -20,6 +20,7 @@ use ply_rs_bw::ply::{
 
 use super::read::{Cursor, count};
 use super::report::{Fault, Place};
+use crate::parser_message;
 
 /// The values of one row that matter here, each 0 where the header does not declare it.
 #[derive(Default)]
@@ -226,7 +227,6 @@ fn fault(at: Place, expected: &str, error: &ParseError) -> Fault {
     let text = error.to_string();
     let text = text.split_once(": ").filter(|_| text.starts_with("Line ")).map_or(&*text, |t| t.1);
     let parts: Vec<&str> = text.splitn(3, "\n\t").take(2).map(str::trim).collect();
-    let found =
-        parts.join(" ").chars().take(MOST).collect::<String>().replace(char::is_control, " ");
+    let found = parser_message(&parts.join(" ")).chars().take(MOST).collect();
     Fault::Syntax { at, expected: expected.to_owned(), found }
 }

@@ -17,13 +17,12 @@
 //! Counts are compared with the size of the file before memory is reserved for them.
 
 use std::fmt;
-use std::fs;
 use std::path::Path;
 use std::str::FromStr;
 
 use super::ply;
 use super::report::{Fault, Place};
-use crate::Vec3;
+use crate::{Vec3, quoted, read_regular};
 
 /// A surface file format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -82,12 +81,7 @@ pub(super) fn parse(bytes: &[u8], format: Format) -> Result<PolygonSoup, Fault> 
 
 /// The content of a regular file: a pipe or a device may never end.
 pub(super) fn content(path: &Path) -> Result<Vec<u8>, Fault> {
-    match fs::metadata(path) {
-        Ok(target) if !target.is_file() => {
-            Err(Fault::Io("cannot be read: not a regular file".into()))
-        }
-        _ => fs::read(path).map_err(|error| Fault::Io(format!("cannot be read: {error}"))),
-    }
+    read_regular(path).map_err(|error| Fault::Io(format!("cannot be read: {error}")))
 }
 
 // The soup.
@@ -391,9 +385,9 @@ impl Token<'_> {
 
 /// Text from a file for a message: shortened, unreadable bytes replaced.
 fn quote(text: &[u8]) -> String {
-    const MAX_BYTES: usize = 40;
-    let shown = String::from_utf8_lossy(&text[..text.len().min(MAX_BYTES)]);
-    format!("{shown:?}{}", if text.len() > MAX_BYTES { "..." } else { "" })
+    /// More bytes than [`quoted`] takes characters.
+    const ENOUGH: usize = 400;
+    quoted(&String::from_utf8_lossy(&text[..text.len().min(ENOUGH)]))
 }
 
 // OFF.

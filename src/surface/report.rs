@@ -348,7 +348,7 @@ impl fmt::Display for Repair {
             }
             Self::TurnedOutward { .. } => write!(f, "turned {what} outward"),
             Self::TurnedInward { .. } => {
-                write!(f, "turned {what} inward that lies in a solid, as the wall of a cavity")
+                write!(f, "turned {what} inward, as a wall of a cavity in a solid")
             }
         }
     }

@@ -284,3 +284,48 @@ fn external_results_without_a_mesh_are_refused_before_any_run() {
         assert!(!Path::new(&out).exists(), "{given}");
     }
 }
+
+/// Values that no run can have, and names that no table can show.
+#[test]
+fn faults_of_a_study_are_refused_before_any_run() {
+    let at = folder();
+    let (file, out) = (at("study.toml"), at("report"));
+    let long = "n".repeat(100_000);
+    let method = |text: &str| format!("[[method]]\nid = \"angle\"\n{text}");
+    for (text, code, why) in [
+        (method("levels = [30.0, nan]"), 2, "--levels angle=NaN: expected a finite number"),
+        (method("levels = [inf]"), 2, "--levels angle=inf: expected a finite number"),
+        (method("levels = [-inf]"), 2, "--levels angle=-inf: expected a finite number"),
+        (method("name = \"\""), 1, "invalid name (found \"\", expected 1 to 100 characters"),
+        (method("name = \" \""), 1, "invalid name (found \" \""),
+        (method("name = \"a\\u001b[2Jb\""), 1, "invalid name (found \"a\\u{1b}[2Jb\""),
+        (method(&format!("name = \"{long}\"")), 1, "invalid name (found \"nnn"),
+        ("[[given]]\nname = \"\"\nfile = \"a.ma\"".to_owned(), 1, "invalid name (found \"\""),
+        ("[groups]\n\"\" = [\"box\"]".to_owned(), 1, "invalid name (found \"\""),
+        (
+            "[groups]\nCAD = [\"bracket\", \"bracet\"]".to_owned(),
+            2,
+            "group \"CAD\": unknown mesh \"bracet\"",
+        ),
+        (format!("{long} = 1"), 1, "study.toml: line 1: unknown field `nnn"),
+        ("spheres = [1,\nmeshes = 3".to_owned(), 1, "study.toml: line "),
+        (format!("meshes = []\nspheres = \"{long}\""), 1, "study.toml: line 2: invalid type"),
+        (format!("[[method]]\nid = \"{long}\""), 2, "unknown method `nnn"),
+    ] {
+        fs::write(&file, text).expect("written");
+        let words = ["compare", "--study", &file, "--out", &out];
+        let (found, _, message) = crate::command::run(&words);
+        assert!(found == code && message.contains(why), "{found}: {message:.2000}");
+        assert!(
+            message.len() < 1_500 && message.trim_end().lines().count() == 1,
+            "{message:.2000}"
+        );
+        assert!(!Path::new(&out).exists());
+    }
+    for level in ["nan", "inf", "-inf", "1e999"] {
+        let levels = format!("angle={level}");
+        let words =
+            ["compare", "builtin:box", "--methods", "angle", "--levels", &levels, "--out", &out];
+        refused(&words, 2, "expected a finite number");
+    }
+}

@@ -101,13 +101,19 @@ fn a_forged_folder_is_refused_or_measured() {
         ("seconds = { capsule-20 = nan }", "expected a number from 0"),
         ("bibtex = \"@misc{x, title = {a}\"", "balanced braces"),
         ("bibtex = \"\\\\input{/etc/passwd}\"", "balanced braces"),
+        ("bibtex = \"@misc{a, title = {x}} @misc{b, title = {y}}\"", "expected one entry"),
+        ("bibtex = \"@misc{a}, year = {2027}}\"", "expected one entry"),
+        ("root:x:0:0:root:/root:/bin/bash", "line 1: "),
+        (&format!("{} = 1", "k".repeat(50_000)), "unknown field"),
+        (&format!("seconds = {{ \"{}\" = -1.0 }}", "k".repeat(50_000)), "expected a number from 0"),
         (&format!("title = \"{long}\""), "too large"),
     ];
     for (text, reason) in claims {
         fs::write(at("theirs/method.toml"), text).expect("written");
         let message = refused(&at("theirs"), &at("report"));
         assert!(message.contains("method.toml") && message.contains(reason), "{text}: {message}");
-        assert!(message.len() < 2_000, "{}", message.len());
+        assert!(message.len() < 1_000 && message.trim_end().lines().count() == 1, "{message}");
+        assert!(!message.contains("root:x"), "{message}");
     }
     fs::remove_file(at("theirs/method.toml")).expect("removed");
 
@@ -130,6 +136,68 @@ fn a_forged_folder_is_refused_or_measured() {
     assert_eq!(theirs[0]["simplify"]["spheres"], 20);
     let page = fs::read_to_string(at("report/index.html")).expect("a page");
     assert!(!page.contains("<script>alert(1)") && !page.contains('\u{202e}'));
+}
+
+/// A file of the reader must not show in an error or a report.
+#[cfg(unix)]
+#[test]
+fn links_that_lead_out_of_a_folder_are_refused() {
+    use std::os::unix::fs::symlink;
+    let at = folder();
+    fs::create_dir(at("theirs")).expect("a folder");
+    let good = at("theirs/capsule-20.ma");
+    done(&["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "-o", &good]);
+    fs::write(at("secret"), "password = 1\n").expect("written");
+    fs::copy(&good, at("outside.ma")).expect("copied");
+    for (link, target) in [
+        ("method.toml", at("secret")),
+        ("method.toml", "../secret".to_owned()),
+        ("method.toml", at("missing")),
+        ("capsule-30.ma", at("secret")),
+        ("capsule-30.csv", at("outside.ma")),
+        ("capsule-30.ma", "/dev/zero".to_owned()),
+    ] {
+        let path = at(&format!("theirs/{link}"));
+        symlink(target, &path).expect("a link");
+        let message = refused(&at("theirs"), &at("report"));
+        assert!(message.contains(&format!("{link}: a link that leads out")), "{message}");
+        assert!(!message.contains("password"), "{message}");
+        fs::remove_file(path).expect("removed");
+    }
+    // A link of the user to the folder, and one in it.
+    fs::rename(&good, at("theirs/20.ma")).expect("renamed");
+    symlink("20.ma", &good).expect("a link");
+    symlink(at("theirs"), at("link")).expect("a link");
+    assert_eq!(compared_with(&at("link"), &at("report")).len(), 1);
+}
+
+#[test]
+fn files_of_a_folder_are_read_or_named() {
+    let at = folder();
+    fs::create_dir(at("theirs")).expect("a folder");
+    let mesh = at("theirs/capsule-20.ma");
+    done(&["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "-o", &mesh]);
+    for (name, spheres) in [("capsule-4.csv", 4), ("capsule-5.sph", 5)] {
+        let rows: Vec<String> =
+            (0..spheres).map(|k| format!("{} 0 0 0.2", 0.1 * f64::from(k))).collect();
+        let text = match name.ends_with("csv") {
+            true => format!("x,y,z,r\n{}\n", rows.join("\n").replace(' ', ",")),
+            false => format!("{spheres}\n{}\n", rows.join("\n")),
+        };
+        fs::write(at(&format!("theirs/{name}")), text).expect("written");
+    }
+    for name in ["README.md", "elephant-20.ma", "capsule-x.ma", "capsule-20.vtp"] {
+        fs::write(at(&format!("theirs/{name}")), "").expect("written");
+    }
+    let given = format!("theirs={}", at("theirs"));
+    let words =
+        ["compare", "builtin:capsule", "--methods", "qmat", "--counts-only", "--samples", "500"];
+    let (code, _, message) =
+        run(&[&words[..], &["--given", &given, "--out", &at("report")]].concat());
+    let listed = "(README.md, capsule-20.vtp, capsule-x.ma, elephant-20.ma)";
+    assert!(code == 0 && message.contains(listed), "{code} {message}");
+    let theirs = records(at("report")).into_iter().filter(|record| record["status"] == "external");
+    assert_eq!(theirs.count(), 3);
 }
 
 #[test]

@@ -67,7 +67,7 @@ type Layers<'a> = &'a [&'a [&'a str]];
 
 /// Inside `medial`. The geometry kernel is a separate crate, below all of them.
 const MEDIAL: Layers<'_> = &[
-    &["atomic", "colour", "diagnostics", "heap", "range_queue", "sum"],
+    &["atomic", "input", "colour", "diagnostics", "heap", "range_queue", "sum"],
     &["surface"],
     &["complex"],
     &["metrics"],

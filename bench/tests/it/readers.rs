@@ -50,6 +50,15 @@ fn viewer_formats_are_written_and_never_read() {
     let (_, object) = json(&["convert", &ma, &at("e.glb")]);
     let warning = "rounded coordinates and radii to single precision, by at most";
     assert!(object["warnings"].to_string().contains(warning), "{object}");
+    // The same note of each verb that writes the format.
+    for (to, warning) in [("f.glb", warning), ("f.obj", "left out the radii")] {
+        let file = at(to);
+        let simplify = ["simplify", "builtin:box:8", "-m", "qmat", "--spheres", "8", "-o", &file];
+        for words in [&simplify[..], &["axis", "builtin:box:8", "-o", &file]] {
+            let (_, object) = json(words);
+            assert!(object["warnings"].to_string().contains(warning), "{object}");
+        }
+    }
 }
 
 #[test]
@@ -134,5 +143,27 @@ fn unsupported_options_are_refused_before_a_file_is_written() {
     done(&["datasets", "make", "sphere", "--resolution", "8", "-o", &surface]);
     for (to, options) in [("y.glb", &[][..]), ("y.vtp", &[]), ("y.off", &["--spheres"])] {
         refused(&[&["convert", &surface, &at(to)], options].concat(), 2, "");
+    }
+}
+
+/// A pipe or device may never end.
+#[cfg(unix)]
+#[test]
+fn inputs_that_are_no_files_are_refused() {
+    let at = folder();
+    for extension in ["ma", "ply", "obj", "off", "csv", "json", "yaml", "urdf", "txt"] {
+        let [pipe, device] = ["pipe", "zero"].map(|name| at(&format!("{name}.{extension}")));
+        assert!(Command::new("mkfifo").arg(&pipe).status().expect("runs").success());
+        std::os::unix::fs::symlink("/dev/zero", &device).expect("a link");
+        for path in [&pipe, &device] {
+            let why = "not a regular file";
+            refused(&["convert", path, &at("x.ma")], 1, why);
+            refused(&["convert", path, &at("x.ply")], 1, why);
+            refused(&["evaluate", "builtin:box:8", path], 1, why);
+            if extension != "off" {
+                refused(&["view", path, "-o", &at("x.html")], 1, why);
+                refused(&["reconstruct", path, "-o", &at("x.off")], 1, why);
+            }
+        }
     }
 }

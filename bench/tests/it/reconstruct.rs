@@ -51,6 +51,17 @@ fn both_methods_reconstruct_a_torus() {
     assert!(done(&[&words[..], &[&all]].concat()).contains("genus 1"));
 }
 
+/// The axis of a box has spheres of radius 0 in its corners, smaller than any spacing of balls.
+#[test]
+fn the_union_of_a_connected_mesh_is_connected() {
+    let at = folder();
+    for mesh in ["builtin:box:8", "builtin:bracket"] {
+        done(&["axis", mesh, "-o", &at("x.ma")]);
+        let (code, object) = json(&["reconstruct", &at("x.ma"), "-o", &at("x.ply")]);
+        assert_eq!((code, &object["union_betti"][0]), (0, &1.into()), "{object}");
+    }
+}
+
 /// A thin ring, whose hole a coarse surface closes, and a ball without such details.
 #[test]
 fn the_tolerance_is_as_coarse_as_the_topology_allows() {

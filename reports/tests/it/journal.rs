@@ -3,7 +3,7 @@
 use std::fs;
 
 use super::common::{comparison, ok, request};
-use medial_reports::{Journal, JournalError, Status, read_records, write_records};
+use medial_reports::{Journal, JournalError, Status, parse_records, read_records, write_records};
 use proptest::prelude::*;
 
 #[test]
@@ -61,5 +61,16 @@ proptest! {
         let read = read_records(&path).unwrap();
         prop_assert_eq!(read.records.last(), Some(&last));
         prop_assert_eq!(read.records.len(), complete + 1);
+    }
+}
+
+#[test]
+fn the_message_of_a_bad_line_is_short() {
+    let long = format!("\u{1b}[2J{}", "x".repeat(1_000_000));
+    for line in
+        [format!("{{\"{long}\": 1}}"), format!("\"{long}\""), format!("{{\"key\": [\"{long}\"]}}")]
+    {
+        let message = parse_records(line.as_bytes()).bad_lines[0].to_string();
+        assert!(message.len() < 400 && !message.contains(char::is_control), "{message:.1000}");
     }
 }

@@ -31,8 +31,8 @@ use std::io::{self, Write};
 use std::str::SplitAsciiWhitespace;
 
 use super::{LoadedMa, MaError, MaErrorKind, Radii, ReadOptions};
-use crate::Vec3;
 use crate::complex::{MedialMesh, Sphere};
+use crate::{Vec3, quoted};
 
 /// Reads a medial mesh from the text of a `.ma` file; `name` is the file in errors.
 ///
@@ -189,16 +189,7 @@ impl<'a> Words<'a> {
 
 pub(super) fn finite(text: &str, field: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
-    number.ok_or_else(|| format!("the {field} {:?} is not a finite number", shortened(text)))
-}
-
-/// A word as it may be repeated in a message.
-pub(super) fn shortened(text: &str) -> String {
-    const LIMIT: usize = 40;
-    match text.char_indices().nth(LIMIT) {
-        Some((end, _)) => format!("{}...", &text[..end]),
-        None => text.to_owned(),
-    }
+    number.ok_or_else(|| format!("the {field} {} is not a finite number", quoted(text)))
 }
 
 /// The three counts of a line that is the header of a complex, and whether there is a fourth, of tetrahedra.
@@ -312,8 +303,8 @@ impl Records {
             }
             (_, &[Some(3), Some(_)]) => return Err(line.malformed(NO_RADII)),
             _ => {
-                let found = shortened(&line.text);
-                let why = format!("expected three counts `nV nE nF` first, found {found:?}");
+                let found = quoted(&line.text);
+                let why = format!("expected three counts `nV nE nF` first, found {found}");
                 return Err(line.malformed(why));
             }
         };
@@ -368,8 +359,8 @@ impl Records {
                 SPHERE
             }
             _ if is_list => {
-                let found = shortened(letter);
-                let why = format!("a list of spheres alone has lines `v x y z r`, found {found:?}");
+                let found = quoted(letter);
+                let why = format!("a list of spheres alone has lines `v x y z r`, found {found}");
                 return Err(line.malformed(why));
             }
             "e" => {
@@ -430,8 +421,8 @@ impl Records {
             (FACE, ["0"]) => Ok(false),
             (FACE, ["1"]) => Ok(true),
             (FACE, [word]) => Err(format!(
-                "a face has three spheres; the fourth word {:?} is no mark of deletion (0 or 1)",
-                shortened(word)
+                "a face has three spheres; the fourth word {} is no mark of deletion (0 or 1)",
+                quoted(word)
             )),
             (FACE, [importance, deleted]) => {
                 finite(importance, "flag")?;
@@ -614,13 +605,13 @@ fn drop_simplices<const N: usize>(
 fn integer(word: &str) -> Result<f64, String> {
     let value = finite(word, "flag")?;
     if value.fract() != 0.0 || value.abs() > f64::from(i32::MAX) {
-        return Err(format!("the flag {word} is not a whole number"));
+        return Err(format!("the flag {} is not a whole number", quoted(word)));
     }
     Ok(value)
 }
 
 fn not_flags(words: &[&str]) -> String {
-    format!("{:?} behind the values: flags of no known tool", shortened(&words.join(" ")))
+    format!("{} behind the values: flags of no known tool", quoted(&words.join(" ")))
 }
 
 /// The message of counts that differ. `found` stops at the first record too many.
@@ -631,14 +622,14 @@ fn miscount(kind: usize, announced: u64, found: u64) -> String {
 }
 
 fn no_sphere(text: &str, spheres: u64) -> String {
-    let text = shortened(text);
-    format!("{text:?} is not one of the {spheres} spheres; indices start at 0")
+    let text = quoted(text);
+    format!("{text} is not one of the {spheres} spheres; indices start at 0")
 }
 
 /// The message of a line that is no `v`, no `f` and no record of `letter`, that of edges.
 fn unknown_record(line: &Line<'_>, letter: char, word: &str) -> MaError {
-    let found = shortened(word);
-    line.malformed(format!("expected a line that starts with v, {letter} or f, found {found:?}"))
+    let found = quoted(word);
+    line.malformed(format!("expected a line that starts with v, {letter} or f, found {found}"))
 }
 
 const NO_RADII: &str = "points without radii: `--radii surface` takes their distances to a surface";
@@ -729,8 +720,8 @@ fn obj_indices(words: Words<'_>, vertices: usize) -> Result<Vec<u32>, MaError> {
         });
         let index = from_zero.filter(|&index| index < vertices as i64);
         let Some(index) = index.and_then(|index| u32::try_from(index).ok()) else {
-            let (found, why) = (shortened(word), "is not one of the");
-            let why = format!("{found:?} {why} {vertices} vertices above, counted from 1");
+            let (found, why) = (quoted(word), "is not one of the");
+            let why = format!("{found} {why} {vertices} vertices above, counted from 1");
             return Err(words.line.malformed(why));
         };
         indices.push(index);

@@ -20,7 +20,6 @@ mod spheres;
 mod viewers;
 
 use std::fmt;
-use std::fs;
 use std::io;
 use std::path::Path;
 
@@ -30,7 +29,7 @@ pub use spheres::left_out;
 pub use viewers::{Look, SphereValues, parse_ply};
 
 use super::{ComplexError, MedialMesh};
-use crate::atomic::write_atomically;
+use crate::{read_regular, write_atomically};
 
 /// A medial mesh from a file, in canonical form, and the changes that this took.
 #[derive(Clone, Debug, PartialEq)]
@@ -159,7 +158,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<LoadedMa, MaError> {
 pub fn read_with(path: impl AsRef<Path>, options: ReadOptions) -> Result<LoadedMa, MaError> {
     let path = path.as_ref();
     parser(path)?;
-    let bytes = fs::read(path).map_err(|error| MaError::of(path.display(), error))?;
+    let bytes = read_regular(path).map_err(|error| MaError::of(path.display(), error))?;
     read_content(path, &bytes, options)
 }
 
@@ -173,6 +172,8 @@ pub fn read_content(
     options: ReadOptions,
 ) -> Result<LoadedMa, MaError> {
     let path = path.as_ref();
+    // Editors of some systems write a byte-order mark.
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     parser(path)?(bytes, &path.display().to_string(), options)
 }
 

@@ -11,22 +11,27 @@
 //! | `.xml` | MJCF: `geom` elements of type `sphere`, of a `body` |
 //!
 //! The link is named after the file. The readers search a document for lists of spheres, one for each link. They skip
-//! other shapes and ignore frames, joints and classes: a list is in the frame of its link.
+//! other shapes and ignore frames and joints: a list is in the frame of its link. A `geom` of MJCF is a sphere by default,
+//! and takes missing attributes from its default class.
 //!
 //! Sources: cuRobo, <https://curobo.org>; XRDF 1.0, <https://nvidia-isaac-ros.github.io/concepts/manipulation/xrdf.html>;
 //! URDF, <https://wiki.ros.org/urdf/XML>; MJCF, <https://mujoco.readthedocs.io/en/stable/XMLreference.html>.
 
+use std::array;
+use std::collections::HashMap;
+use std::fmt;
 use std::io::{self, Write};
 use std::path::Path;
 
 use roxmltree::{Document, Node};
-use serde_json::Value;
-use serde_saphyr::NonFiniteFloatPolicy;
+use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
+use serde_json::{Map, Value};
+use serde_saphyr::{MessageFormatter, NonFiniteFloatPolicy, UserMessageFormatter};
 
-use super::ma::{canonical, finite, lines, note, parse_ma, shortened};
+use super::ma::{canonical, finite, lines, note, parse_ma};
 use super::{LoadedMa, MaError, MaErrorKind, ReadOptions, extension};
-use crate::Vec3;
 use crate::complex::{MedialMesh, Sphere};
+use crate::{Vec3, parser_message, quoted, shortened};
 
 /// The text of a format: its extensions, and the text before all spheres, of each, between two, and behind all.
 struct Layout(&'static [&'static str], &'static str, &'static str, &'static str, &'static str);
@@ -185,12 +190,17 @@ fn chosen(mut links: Vec<Link>, name: &str, options: ReadOptions) -> Loaded {
 /// Most links that an error lists.
 const MOST_LISTED: usize = 60;
 
-/// Reads rows `x,y,z,r` or `x y z r`, below a header or without one.
+/// Reads rows `x,y,z,r` or `x y z r`, below a header or without one. Every row has as many fields as the first: a
+/// decimal comma or a separator of thousands would shift the others.
 pub(super) fn parse_rows(bytes: &[u8], name: &str, options: ReadOptions) -> Loaded {
     let mut columns = [0, 1, 2, 3];
     let mut link = Link::default();
+    let (mut separator, mut width) = (None, COLUMNS.len());
     for (k, line) in lines(bytes, name).enumerate() {
-        let fields = fields(&line.text);
+        if k == 0 {
+            separator = separator_of(&line.text);
+        }
+        let fields = fields(&line.text, separator);
         let is_header = k == 0 && fields.iter().all(|field| field.parse::<f64>().is_err());
         if is_header {
             let names: Vec<String> =
@@ -198,24 +208,29 @@ pub(super) fn parse_rows(bytes: &[u8], name: &str, options: ReadOptions) -> Load
             let place = |known: &[&str]| names.iter().position(|name| known.contains(&&**name));
             for (column, known) in columns.iter_mut().zip(COLUMNS) {
                 *column = place(known).ok_or_else(|| {
-                    let found = shortened(&line.text);
+                    let found = quoted(&line.text);
                     line.malformed(format!(
-                        "no column {} (found {found:?}, expected x,y,z,r)",
+                        "no column {} (found {found}, expected x,y,z,r)",
                         known[0]
                     ))
                 })?;
             }
+            width = fields.len();
             continue;
+        }
+        if fields.len() != width {
+            let found = quoted(&line.text);
+            let why = format!("{} fields instead of {width} (found {found})", fields.len());
+            return Err(
+                line.malformed(why + "; write decimal points and no separators of thousands")
+            );
         }
         let mut numbers = [0.0; 4];
         for ((number, column), known) in numbers.iter_mut().zip(columns).zip(COLUMNS) {
-            let field = fields.get(column).copied().unwrap_or_default();
-            *number = finite(field, known[0]).map_err(|why| line.malformed(why))?;
-        }
-        if columns == [0, 1, 2, 3] && fields.len() > 4 && k == 0 {
-            let found = shortened(&line.text);
-            let why = format!("more than four numbers without a header (found {found:?})");
-            return Err(line.malformed(why));
+            *number = finite(fields[column], known[0]).map_err(|why| {
+                let is_comma = fields[column].contains(',');
+                line.malformed(why + if is_comma { "; write a decimal point" } else { "" })
+            })?;
         }
         let [x, y, z, radius] = numbers;
         link.spheres.push(Sphere::new(Vec3::new(x, y, z), radius));
@@ -226,11 +241,15 @@ pub(super) fn parse_rows(bytes: &[u8], name: &str, options: ReadOptions) -> Load
 /// Names of the columns in a header.
 const COLUMNS: [&[&str]; 4] = [&["x"], &["y"], &["z"], &["r", "radius"]];
 
-/// The fields of a row, which commas or semicolons separate where there are any.
-fn fields(text: &str) -> Vec<&str> {
-    match text.contains([',', ';']) {
-        true => text.split([',', ';']).map(str::trim).collect(),
-        false => text.split_ascii_whitespace().collect(),
+/// The separator of a list by its first line: semicolons before commas, which can be decimal. `None` for blanks.
+fn separator_of(line: &str) -> Option<char> {
+    [';', ','].into_iter().find(|separator| line.contains(*separator))
+}
+
+fn fields(line: &str, separator: Option<char>) -> Vec<&str> {
+    match separator {
+        Some(separator) => line.split(separator).map(str::trim).collect(),
+        None => line.split_ascii_whitespace().collect(),
     }
 }
 
@@ -238,7 +257,7 @@ fn fields(text: &str) -> Vec<&str> {
 pub(super) fn parse_clump(bytes: &[u8], name: &str, options: ReadOptions) -> Loaded {
     // The first line of the others can be four counts; the second of none is four numbers then.
     let is_row = |text: &str| {
-        let fields = fields(text);
+        let fields = fields(text, separator_of(text));
         let are_numbers = fields.iter().all(|field| field.parse::<f64>().is_ok());
         fields.len() == 4 && (are_numbers || fields[0].eq_ignore_ascii_case("x"))
     };
@@ -249,10 +268,73 @@ pub(super) fn parse_clump(bytes: &[u8], name: &str, options: ReadOptions) -> Loa
 
 /// Reads every list of spheres in a JSON document: an object for each, with `center` or `origin`, and `radius`.
 pub(super) fn parse_json(bytes: &[u8], name: &str, options: ReadOptions) -> Loaded {
-    let document = serde_json::from_slice(bytes).map_err(|error| {
-        malformed(name, Some(error.line()).filter(|&line| line > 0), error.to_string())
+    let Unique(document) = serde_json::from_slice(bytes).map_err(|error| {
+        let line = Some(error.line()).filter(|&line| line > 0);
+        malformed(name, line, parser_message(&error.to_string()))
     })?;
     from_document(&document, name, options)
+}
+
+/// A value of JSON without an object that has a key twice, of which one list would be lost.
+struct Unique(Value);
+
+impl<'de> Deserialize<'de> for Unique {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(UniqueVisitor).map(Self)
+    }
+}
+
+struct UniqueVisitor;
+
+impl<'de> Visitor<'de> for UniqueVisitor {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a value")
+    }
+
+    fn visit_unit<E>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_str<E>(self, value: &str) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Value, A::Error> {
+        let mut array = Vec::new();
+        while let Some(Unique(item)) = items.next_element()? {
+            array.push(item);
+        }
+        Ok(array.into())
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Value, A::Error> {
+        let mut object = Map::new();
+        while let Some((key, Unique(value))) = entries.next_entry::<String, _>()? {
+            if object.contains_key(&key) {
+                return Err(A::Error::custom(format!("duplicate key {}", quoted(&key))));
+            }
+            object.insert(key, value);
+        }
+        Ok(object.into())
+    }
 }
 
 /// [`parse_json`] for YAML: cuRobo's files, with or without the rest of the robot's configuration, and XRDF.
@@ -269,10 +351,11 @@ pub(super) fn parse_yaml(bytes: &[u8], name: &str, options: ReadOptions) -> Load
     };
     let read = serde_saphyr::from_slice_with_options(bytes, options_of_yaml);
     let document: Value = read.map_err(|error| {
-        let text = error.to_string();
-        let why = text.lines().next().unwrap_or_default().to_owned();
+        // The default messages name functions of the crate, and both its own limits.
+        let why = UserMessageFormatter.format_message(error.without_snippet());
+        let why = why.split(": limits breached").next().unwrap_or_default();
         let line = error.location().map(|location| location.line() as usize);
-        malformed(name, line, why)
+        malformed(name, line, parser_message(why))
     })?;
     from_document(&document, name, options)
 }
@@ -290,7 +373,9 @@ fn collect(value: &Value, key: &str, links: &mut Vec<Link>) -> Result<(), String
             let mut link = Link { name: key.to_owned(), ..Link::default() };
             for (k, item) in items.iter().enumerate() {
                 let sphere = sphere(item);
-                link.spheres.push(sphere.map_err(|why| format!("{key}, sphere {}: {why}", k + 1))?);
+                link.spheres.push(
+                    sphere.map_err(|why| format!("{}, sphere {}: {why}", shortened(key), k + 1))?,
+                );
             }
             links.push(link);
             Ok(())
@@ -320,36 +405,50 @@ fn sphere(item: &Value) -> Result<Sphere, String> {
 }
 
 fn text(value: &Value) -> String {
-    shortened(&value.to_string())
+    value.as_str().map_or_else(|| shortened(&value.to_string()), quoted)
 }
 
 /// Reads the spheres of a URDF or MJCF document; its root element decides.
 pub(super) fn parse_xml(bytes: &[u8], name: &str, options: ReadOptions) -> Loaded {
     let text = str::from_utf8(bytes).map_err(|error| malformed(name, None, error.to_string()))?;
-    let document = Document::parse(text)
-        .map_err(|error| malformed(name, Some(error.pos().row as usize), error.to_string()))?;
+    let document = Document::parse(text).map_err(|error| {
+        malformed(name, Some(error.pos().row as usize), parser_message(&error.to_string()))
+    })?;
     let root = document.root_element().tag_name().name();
     let (owners, shape): (&[&str], &str) = match root {
         "robot" => (&["link"], "collision"),
         "mujoco" => (&["worldbody", "body"], "geom"),
         _ => {
-            let found = shortened(root);
-            let why = format!("unknown root element (found {found:?}, expected robot or mujoco)");
+            let found = quoted(root);
+            let why = format!("unknown root element (found {found}, expected robot or mujoco)");
             return Err(malformed(name, None, why));
         }
     };
+    let classes = default_classes(&document);
+    // Class of the shapes in each owner; owners of others come first.
+    let mut class_of = HashMap::new();
     let mut links = Vec::new();
     for owner in document.descendants().filter(|node| owners.contains(&node.tag_name().name())) {
         let tag = owner.tag_name().name();
+        let outer = owner.parent().and_then(|outer| class_of.get(&outer.id()).copied());
+        let class = owner.attribute("childclass").or(outer).unwrap_or(MAIN);
+        class_of.insert(owner.id(), class);
         let mut link =
             Link { name: owner.attribute("name").unwrap_or(tag).into(), ..Link::default() };
         for element in owner.children().filter(|child| child.has_tag_name(shape)) {
-            let Some([centre, radius]) = attributes(element) else {
+            let attributes = match shape {
+                "geom" => of_geom(element, element.attribute("class").unwrap_or(class), &classes),
+                _ => of_collision(element),
+            };
+            let Some([centre, radius]) = attributes else {
                 link.others += 1;
                 continue;
             };
-            let row = document.text_pos_at(element.range().start).row as usize;
-            let sphere = numbers(centre, radius).map_err(|why| malformed(name, Some(row), why))?;
+            let sphere = numbers(centre, radius).map_err(|why| {
+                // The search of a line reads the document from its start.
+                let row = document.text_pos_at(element.range().start).row as usize;
+                malformed(name, Some(row), why)
+            })?;
             link.spheres.push(sphere);
         }
         links.push(link);
@@ -357,24 +456,64 @@ pub(super) fn parse_xml(bytes: &[u8], name: &str, options: ReadOptions) -> Loade
     chosen(links, name, options)
 }
 
-/// The centre and the radius of a `collision` or `geom` element; `None` for another shape.
-fn attributes<'a>(element: Node<'a, '_>) -> Option<[&'a str; 2]> {
-    let child = |parent: Node<'a, '_>, tag| parent.children().find(|node| node.has_tag_name(tag));
-    let (centre, radius) = if element.has_tag_name("geom") {
-        (element.attribute("type") == Some("sphere")).then_some(())?;
-        (element.attribute("pos"), element.attribute("size"))
-    } else {
-        let sphere = child(child(element, "geometry")?, "sphere")?;
-        let origin = child(element, "origin");
-        (origin.and_then(|origin| origin.attribute("xyz")), sphere.attribute("radius"))
-    };
+fn child<'a, 'i>(parent: Node<'a, 'i>, tag: &str) -> Option<Node<'a, 'i>> {
+    parent.children().find(|node| node.has_tag_name(tag))
+}
+
+/// The centre and the radius of a `collision` element; `None` for another shape.
+fn of_collision<'a>(element: Node<'a, '_>) -> Option<[&'a str; 2]> {
+    let sphere = child(child(element, "geometry")?, "sphere")?;
+    let origin = child(element, "origin").and_then(|origin| origin.attribute("xyz"));
     // Without a position, a shape is at the origin of its link.
-    Some([centre.unwrap_or("0 0 0"), radius.unwrap_or_default()])
+    Some([origin.unwrap_or("0 0 0"), sphere.attribute("radius").unwrap_or_default()])
+}
+
+/// Attributes of a `geom`, its own or of its default class.
+const GEOM: [&str; 5] = ["type", "mesh", "fromto", "pos", "size"];
+
+/// Values of [`GEOM`].
+type Geom<'a> = [Option<&'a str>; 5];
+
+/// Key of the outermost default class, which may have any name.
+const MAIN: &str = "";
+
+fn with_defaults<'a>(element: Node<'a, '_>, defaults: Geom<'a>) -> Geom<'a> {
+    array::from_fn(|k| element.attribute(GEOM[k]).or(defaults[k]))
+}
+
+/// The defaults of the `geom` elements of each class, with those of the classes around it.
+fn default_classes<'a>(document: &'a Document<'_>) -> HashMap<&'a str, Geom<'a>> {
+    let mut classes: HashMap<&str, Geom<'_>> = HashMap::new();
+    // Outer classes come first.
+    for class in document.descendants().filter(|node| node.has_tag_name("default")) {
+        let outer = class.parent().filter(|outer| outer.has_tag_name("default"));
+        let outer_name = outer.and_then(|outer| outer.attribute("class")).unwrap_or(MAIN);
+        let inherited = classes.get(outer_name).copied().unwrap_or_default();
+        let own = child(class, "geom").map_or(inherited, |geom| with_defaults(geom, inherited));
+        classes.extend(class.attribute("class").map(|name| (name, own)));
+        if outer.is_none() {
+            classes.insert(MAIN, own);
+        }
+    }
+    classes
+}
+
+/// The centre and the radius of a `geom` element; `None` for another shape.
+fn of_geom<'a>(
+    element: Node<'a, '_>,
+    class: &str,
+    classes: &HashMap<&str, Geom<'a>>,
+) -> Option<[&'a str; 2]> {
+    let defaults = classes.get(class).or(classes.get(MAIN)).copied().unwrap_or_default();
+    let [kind, mesh, ends, centre, radius] = with_defaults(element, defaults);
+    // MuJoCo fits a sphere to the mesh, which this reader does not have. Ends belong to capsules and boxes.
+    let is_sphere = kind.unwrap_or("sphere") == "sphere" && mesh.is_none() && ends.is_none();
+    is_sphere.then(|| [centre.unwrap_or("0 0 0"), radius.unwrap_or_default()])
 }
 
 fn numbers(centre: &str, radius: &str) -> Result<Sphere, String> {
     let [x, y, z] = *centre.split_ascii_whitespace().collect::<Vec<_>>() else {
-        return Err(format!("the position {:?} is not three numbers", shortened(centre)));
+        return Err(format!("the position {} is not three numbers", quoted(centre)));
     };
     let centre = Vec3::new(finite(x, "x")?, finite(y, "y")?, finite(z, "z")?);
     // MJCF allows three sizes, of which a sphere uses the first.
@@ -439,8 +578,22 @@ mod tests {
         assert_eq!(load("x.urdf", urdf).unwrap().notes, ["1 element was skipped: not a sphere"]);
         let mjcf = "<mujoco><worldbody><geom type='plane' size='1 1 1'/><body name='a'><body name='b'>\
                     <geom type='sphere' size='3 0 0'/></body></body></worldbody></mujoco>";
+        // The type and the size of a class, of the class around it, and of the class of a body.
+        let classes = "<mujoco><default><geom size='2'/><default class='c'><geom type='capsule'/>\
+                       <default class='s'><geom type='sphere'/></default></default></default><worldbody>\
+                       <geom/><geom class='s' pos='1 0 0'/><geom class='c'/><geom type='sphere' size='3'/>\
+                       </worldbody></mujoco>";
+        let childclass = "<mujoco><default><default class='c'><geom type='box' size='5'/></default></default>\
+                          <worldbody><body childclass='c'><geom/><body><geom/><geom type='sphere'/></body></body>\
+                          </worldbody></mujoco>";
         for (name, text, expected) in [
-            ("x.csv", "Z,radius,id,y,X\n1,2,7,3,4\n", &[2.0][..]),
+            ("x.xml", classes, &[2.0, 2.0, 3.0][..]),
+            ("x.xml", childclass, &[5.0]),
+            ("x.json", "\u{feff}[{\"center\": [0, 0, 0], \"radius\": 1}]", &[1.0]),
+            ("x.yaml", "\u{feff}a: [{center: [0, 0, 0], radius: 1}]", &[1.0]),
+            ("x.urdf", &format!("\u{feff}{urdf}"), &[2.0]),
+            ("x.csv", "x;y;z;r;note\n1;2;3;4;a, b\n", &[4.0]),
+            ("x.csv", "Z,radius,id,y,X\n1,2,7,3,4\n", &[2.0]),
             ("x.csv", "0, 0, 0, 1\r\n0, 0, 1, 2\r\n", &[1.0, 2.0]),
             ("x.csv", "\u{feff}\"x\";\"y\";\"z\";\"r\"\n0;0;0;1\n", &[1.0]),
             ("x.txt", "# clump\n0 0 0 1\n0 0 1 2\n", &[1.0, 2.0]),
@@ -455,6 +608,19 @@ mod tests {
         ] {
             assert_eq!(radii(name, text), expected, "{text}");
         }
+    }
+
+    /// Quadratic time took a minute.
+    #[test]
+    fn many_spheres_of_a_robot_are_read_in_linear_time() {
+        let start = std::time::Instant::now();
+        let collision = "<collision><geometry><sphere radius='1'/></geometry></collision>\n";
+        let urdf = format!("<robot><link>\n{}</link></robot>", collision.repeat(40_000));
+        assert_eq!(radii("x.urdf", &urdf).len(), 40_000);
+        let geoms = "<geom size='1'/>\n".repeat(40_000);
+        let mjcf = format!("<mujoco><worldbody>\n{geoms}</worldbody></mujoco>");
+        assert_eq!(radii("x.xml", &mjcf).len(), 40_000);
+        assert!(start.elapsed().as_secs() < 10, "{:?}", start.elapsed());
     }
 
     #[test]
@@ -474,6 +640,41 @@ mod tests {
         assert_eq!(error, "x.xrdf: there is no block 3: the file holds 2, counted from 1");
     }
 
+    /// Names and words of a file of any length and with any character.
+    #[test]
+    fn messages_repeat_little_of_a_file() {
+        let long = format!("\u{1b}[2J{}", "secret`\"".repeat(10_000));
+        let json = |value: Value| value.to_string();
+        let ball = serde_json::json!([{ "center": [0, 0, 0], "radius": 1 }]);
+        let bad = serde_json::json!([{ "center": [0, 0, 0], "radius": long }]);
+        let two = Map::from_iter([(long.clone(), ball.clone()), ("b".into(), ball)]);
+        let escaped = long.replace('"', "&quot;").replace('\u{1b}', "?");
+        for (name, text) in [
+            ("x.json", json(two.into())),
+            ("x.json", json(Map::from_iter([(long.clone(), bad)]).into())),
+            ("x.json", format!("{{{0}: 1, {0}: 2}}", json(long.clone().into()))),
+            ("x.yaml", format!("{0}: 1\n{0}: 2\n", json(long.clone().into()))),
+            ("x.csv", format!("{long}\n")),
+            ("x.csv", format!("x,y,z,r\n0,0,0,{long}\n")),
+            ("x.txt", format!("1 0 0 {long}\n")),
+            ("x.ma", format!("1 0 0\nv 0 0 0 {long}\n")),
+            ("x.ma", format!("1 0 0\nv 0 0 0 1 {long}\n")),
+            ("x.ma", format!("2 1 0\nv 0 0 0 1\nv 0 0 0 1\ne 0 {long}\n")),
+            ("x.ma", format!("1 0 0\n{long}\n")),
+            ("x.obj", format!("{long}\n")),
+            ("x.ply", format!("ply\nformat ascii 1.0\n{long}\nend_header\n")),
+            ("x.urdf", format!("<robot name=\"{escaped}\"><link></robot>")),
+            ("x.urdf", format!("<{}/>", "r".repeat(10_000))),
+        ] {
+            let error = load(name, &text).map(|loaded| loaded.mesh).unwrap_err().to_string();
+            assert!(
+                error.len() < 400 && !error.contains(char::is_control),
+                "{name}: {error:.2000}"
+            );
+            assert!(error.matches("secret").count() <= 10, "{error}");
+        }
+    }
+
     #[test]
     fn faults_are_errors_with_their_place() {
         let deep_json = "[".repeat(100_000);
@@ -487,10 +688,32 @@ mod tests {
             ("x.csv", "", ": no spheres"),
             ("x.csv", "x,y,z,r\n", ": no spheres"),
             ("x.csv", "x,y,z\n0,0,0\n", ", line 1: no column r (found \"x,y,z\""),
-            ("x.csv", "x,y,z,r\n0,0,0\n", ", line 2: the r \"\" is not a finite number"),
+            ("x.csv", "x,y,z,r\n0,0,0\n", ", line 2: 3 fields instead of 4 (found \"0,0,0\")"),
+            ("x.csv", "x,y,z,r\n0,0,0,\n", ", line 2: the r \"\" is not a finite number"),
             ("x.csv", "x,y,z,r\n\n0,0,nan,1\n", ", line 3: the z \"nan\" is not a finite number"),
-            ("x.csv", "0,0,,0,1\n", ", line 1: the z \"\" is not a finite number"),
-            ("x.csv", "0,0,0,1,5\n", ", line 1: more than four numbers"),
+            ("x.csv", "0,0,,1\n", ", line 1: the z \"\" is not a finite number"),
+            ("x.csv", "0,0,0,1,5\n", ", line 1: 5 fields instead of 4"),
+            // Decimal commas and separators of thousands.
+            (
+                "x.csv",
+                "x;y;z;r\n1,5;2,5;3,5;1,25\n",
+                ", line 2: the x \"1,5\" is not a finite number; write",
+            ),
+            (
+                "x.csv",
+                "x;y;z;r\n1;2;3;1,25\n",
+                ", line 2: the r \"1,25\" is not a finite number; write",
+            ),
+            ("x.csv", "0;0;0;1\n0;0;0;1,5\n", ", line 2: the r \"1,5\" is not"),
+            ("x.csv", "x,y,z,r\n1,5,2,5,3,5,1,25\n", ", line 2: 8 fields instead of 4"),
+            ("x.csv", "x,y,z,r\n1,500,2,3,4\n", ", line 2: 5 fields instead of 4"),
+            ("x.csv", "x,y,z,r\n\"1,500\",2,3,4\n", ", line 2: 5 fields instead of 4"),
+            ("x.csv", "0,0,0,1\n1,000,0,0,1\n", ", line 2: 5 fields instead of 4"),
+            ("x.csv", "x;y;z;r\n1,2,3,4\n", ", line 2: 1 fields instead of 4"),
+            ("x.csv", "x,y,z,r\n1;2;3;4\n", ", line 2: 1 fields instead of 4"),
+            ("x.csv", "x;y;z;r\n1 500;2;3;4\n", ", line 2: the x \"1 500\" is not"),
+            ("x.txt", "x y z r\n1,5 2,5 3,5 1,25\n", ", line 1: expected three counts"),
+            ("x.xyzr", "0 0 0 1\n0 0 0 1\n1 000 0 0 1\n", ", line 3: 5 fields instead of 4"),
             ("x.xyzr", "0 0 0 1\n0 0 1 inf\n", ", line 2: the r \"inf\" is not"),
             ("x.json", "", ", line 1: EOF"),
             ("x.json", "{\n]", ", line 2: "),
@@ -517,20 +740,30 @@ mod tests {
                 ", line 1: number out of range",
             ),
             ("x.json", &deep_json, ", line 1: recursion limit"),
+            ("x.json", "{\"a\": [],\n\"a\": []}", ", line 2: duplicate key \"a\""),
+            ("x.json", "{\"a\": {\"b\": 1, \"b\": 1}}", ", line 1: duplicate key \"b\""),
+            (
+                "x.json",
+                "[{\"center\": [0, 0, 0], \"radius\": 1, \"radius\": 2}]",
+                ", line 1: duplicate key \"radius\"",
+            ),
             (
                 "x.yaml",
                 "a:\n  - center: [0, 0, 0]\n    radius: .nan\n",
                 ": a, sphere 1: the radius \".nan\" is not a finite number",
             ),
             ("x.yaml", "a: [\n", ", line "),
+            ("x.yaml", "a: 1\na: 2\n", ", line 2: duplicate mapping key `a` is not allowed here"),
+            ("x.yaml", "a: 1\n---\nb: 2\n", ", line 3: only single YAML document expected"),
+            ("x.yaml", "~: 1\n", ", line 1: null is not allowed here"),
             ("x.yaml", "collision_spheres: spheres/franka.yml\n", ": no spheres"),
             (
                 "x.yaml",
                 "a:\n  - {center: [0, 0, 0], radius: -1}\n",
                 ": no spheres (found 1 with a negative radius)",
             ),
-            ("x.yaml", &deep_yaml, ""),
-            ("x.yaml", bomb, ""),
+            ("x.yaml", &deep_yaml, ", line 1: YAML document too large or too complex"),
+            ("x.yaml", bomb, ", line 3: YAML document too large or too complex"),
             ("x.urdf", "<robot>\n<link>\n</robot>", ", line 3: "),
             (
                 "x.urdf",
@@ -552,6 +785,21 @@ mod tests {
                 "x.xml",
                 "<mujoco><worldbody><geom type='sphere' size='1' pos='0 0'/></worldbody></mujoco>",
                 ", line 1: the position \"0 0\" is not three numbers",
+            ),
+            (
+                "x.xml",
+                "<mujoco><worldbody><geom mesh='m'/><geom fromto='0 0 0 0 0 1' size='1'/></worldbody></mujoco>",
+                ": no spheres (found 2 other shapes)",
+            ),
+            (
+                "x.xml",
+                "<mujoco><default><geom type='box'/></default><worldbody><geom size='1'/></worldbody></mujoco>",
+                ": no spheres (found 1 other shapes)",
+            ),
+            (
+                "x.xml",
+                "<mujoco><worldbody>\n<geom/></worldbody></mujoco>",
+                ", line 2: the radius is missing",
             ),
             ("x.xml", &deep_xml, ""),
         ] {

@@ -294,7 +294,7 @@ fn errors_name_the_line_and_the_reason() {
             ),
             ("1 0 0\nv 0 0 0 1 2 0 0 0\n", ", line 2: \"2 0 0 0\" behind the values"),
             ("1 0 0\nv 0 0 0 1 2 x\n", ", line 2: the flag \"x\" is not a finite number"),
-            ("1 0 0\nv 0 0 0 1 2 0.5\n", ", line 2: the flag 0.5 is not a whole number"),
+            ("1 0 0\nv 0 0 0 1 2 0.5\n", ", line 2: the flag \"0.5\" is not a whole number"),
             ("1 0 1\nv 0 0 0 1\nf 0 0 0 7\n", ", line 3: a face has three spheres"),
             ("4 0 1\nv 0 0 0 0\nv 1 0 0 0\nv 0 1 0 0\nv 0 0 1 0\nf 0 2 1\n", ": every radius is 0"),
             ("1 0 0\nv 0 0 0 1\n1\n0 0 1\n0\n", ", line 3: expected the parts"),
