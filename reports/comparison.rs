@@ -211,11 +211,15 @@ impl<'a> Comparison<'a> {
             frozen.clone().map(|entry| entry.record.machine.to_string()).collect();
         let machines: Vec<String> = machines.into_iter().collect();
         let name = frozen.clone().find_map(|entry| entry.record.edition.as_deref())?;
-        Some(format!(
+        let mut note = format!(
             "Rows marked ({name}) are frozen results of edition {name} and did not run here. Frozen time: their \
              seconds on {}, which are in no other column and no plot.",
             machines.join("; ")
-        ))
+        );
+        if frozen.clone().any(|entry| entry.record.is_other_version) {
+            note += " Other version: sources or compiler of the method have changed since, so its results here can differ.";
+        }
+        Some(note)
     }
 
     /// The columns of tables: [`COMPARED`], with the seconds of an edition if it has rows.
@@ -353,6 +357,9 @@ fn short(hash: &str) -> String {
     hash.chars().take(8).collect()
 }
 
+/// The end of the mark of an edition's row whose method has changed since.
+const OTHER_VERSION: &str = ", other version";
+
 /// The identity of a row: the method with its parameters, and the conditions of the run. Records of two builds, of
 /// two samplings or of two accuracies of measuring are never in one mean.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -368,6 +375,7 @@ struct SeriesKey<'a> {
     samples: usize,
     threads: Option<usize>,
     edition: Option<&'a str>,
+    is_other_version: bool,
     is_external: bool,
 }
 
@@ -400,6 +408,7 @@ impl<'a> SeriesKey<'a> {
             samples: conditions.map_or(0, |c| c.samples),
             threads: simplify.threads,
             edition: record.edition.as_deref(),
+            is_other_version: record.is_other_version,
             is_external,
         }
     }
@@ -436,7 +445,8 @@ impl<'a> SeriesKey<'a> {
 
     fn name(&self) -> String {
         let name = self.variant.map_or_else(|| self.method_and_params(), str::to_owned);
-        self.edition.map_or(name.clone(), |edition| format!("{name} ({edition})"))
+        let other = if self.is_other_version { OTHER_VERSION } else { "" };
+        self.edition.map_or(name.clone(), |edition| format!("{name} ({edition}{other})"))
     }
 
     fn method_and_params(&self) -> String {

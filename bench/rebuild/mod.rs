@@ -65,7 +65,7 @@ pub fn rebuild(dir: &Path, registry: &Registry) -> Result<Rebuilt, Failure> {
     let items = Study::read(&dir.join(STUDY))
         .and_then(|study| study.items(registry, &Provenance::here()))
         .unwrap_or_default();
-    write(dir, (records, warnings), &items, &header, true)
+    write(dir, (records, warnings), (&items, registry), &header, true)
 }
 
 /// The report of a run of `compare`, during the run and after it.
@@ -105,14 +105,14 @@ impl RunReport<'_> {
             let now = jiff::Timestamp::now().to_zoned(TimeZone::UTC);
             run.date.get_or_insert_with(|| now.date().to_string());
         }
-        write(self.dir, (records, warnings), self.items, &header, draws)
+        write(self.dir, (records, warnings), (self.items, self.registry), &header, draws)
     }
 }
 
 fn write(
     dir: &Path,
     (mut records, warnings): (Vec<Record>, Vec<String>),
-    items: &[Item],
+    (items, registry): (&[Item], &Registry),
     header: &Header,
     draws: bool,
 ) -> Result<Rebuilt, Failure> {
@@ -122,7 +122,7 @@ fn write(
     let study = Study::read(&dir.join(STUDY)).ok();
     let mut header = header.clone();
     let mixed = study.and_then(|study| match Edition::of(&study) {
-        Ok(edition) => Some(edition?.beside(&study, &records)),
+        Ok(edition) => Some(edition?.beside(&study, &records, registry)),
         // The own results do not depend on it.
         Err(error) => {
             header.notes.push(error.to_string());
