@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::answers::{by_bound, equal_error_table, usual_level};
-use crate::comparison::{Comparison, RISING, RISING_NOTE, reached, row_name};
+use crate::comparison::{Comparison, RISING, reached, row_name};
 use crate::header::MethodNote;
 use crate::metric::{FROZEN_SECONDS, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
 use crate::record::Record;
@@ -72,8 +72,8 @@ pub(crate) fn overview_table(
     if rows.iter().any(|row| row.over < summary.meshes) {
         notes.push("In parentheses: means over fewer meshes, which do not compare.".to_owned());
     }
-    let has_rising = rows.iter().any(|row| row.rising);
-    notes.extend(has_rising.then(|| RISING_NOTE.to_owned()));
+    let here = comparison.entries.iter().filter(|e| e.level == level && e.comparable());
+    notes.extend(comparison.rising_note(here));
     let edition = comparison.edition_note();
     let table = if edition.is_some() { table } else { table.without(&["frozen s"]) };
     let missing: Vec<String> =
