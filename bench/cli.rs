@@ -252,7 +252,7 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Info(arguments) => cmd::info::run(&arguments, global),
         Verb::Axis(arguments) => cmd::axis::run(&arguments, global),
         Verb::Simplify(arguments) => cmd::simplify::run(&arguments, global, registry),
-        Verb::Evaluate(arguments) => cmd::evaluate::run(&arguments, global),
+        Verb::Evaluate(arguments) => cmd::evaluate::run(&arguments, global, registry),
         Verb::Reconstruct(arguments) => cmd::reconstruct::run(&arguments, global),
         Verb::Render(arguments) => cmd::render::run(&arguments, global),
         Verb::View(arguments) => cmd::view::run(&arguments, global),

@@ -1,11 +1,11 @@
 //! Standard output and standard error of the verbs: nothing in a name reaches a terminal as a
 //! command, and nothing that could not be written passes for success.
 
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::sync::OnceLock;
 
 use medial::shape::Cost;
-use medial_reports::printable;
+use medial_reports::{printable, without_markup};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -42,6 +42,14 @@ pub fn print_raw(text: &str) {
 /// Prints a line on standard output, or several.
 pub fn print_line(line: &str) {
     print_raw(&(printable_lines(line) + "\n"));
+}
+
+/// Prints Markdown on standard output, on a terminal without escapes.
+pub fn print_markdown(text: &str) {
+    match io::stdout().is_terminal() {
+        true => print_raw(&printable_lines(&without_markup(text))),
+        false => print_raw(text),
+    }
 }
 
 /// Prints a line on standard error, and ignores failures.

@@ -33,6 +33,9 @@ const USABLE: f64 = 2.0;
 /// Results with a larger error are not ranked by error, in % of the diagonal.
 const RANKED: f64 = 5.0;
 
+/// The quantity of the criterion whose values are in the column of the time.
+const TIME: &str = "its time";
+
 /// The end of the title of a row that is ranked by the number of meshes with a result.
 const MOST_MESHES: &str = ", on the most meshes";
 
@@ -74,16 +77,22 @@ pub(crate) fn purpose_table(
         rows.extend(closest_structure(comparison, level, spheres));
     }
     rows.extend(within_bound(comparison));
-    let is_one = comparison.meshes.len() == 1;
+    let meshes = comparison.meshes.len();
+    let is_one = meshes == 1;
+    let has_few = meshes < FEWEST;
     let rule = format!(
         "Among the levels that were run, without the initial medial mesh and results with errors above {RANKED} %."
     );
+    let few = format!(
+        "No difference is established: {meshes} meshes are too few (the test needs {FEWEST})."
+    );
+    let established = "A difference is established if the signed-rank test over meshes, corrected for all pairs of \
+         methods, has p < 0.05.";
     let medians = "Medians over the meshes that a method ran on. A missing result counts as infinite. A method needs \
          results on at least half of its meshes. If another method has results on more meshes, it is named, too. The \
          ratio to the runner-up is a geometric mean over the meshes where both have a result, with its 95 % interval \
-         if they are at least six. A difference is established if the signed-rank test over meshes, corrected for all \
-         pairs of methods, has p < 0.05."
-        .to_owned();
+         if they are at least six. ";
+    let medians = medians.to_owned() + if has_few { &few } else { established };
     let notes = [how.to_owned(), rule].into_iter().chain((!is_one).then_some(medians));
     let columns = [
         "criterion",
@@ -102,8 +111,9 @@ pub(crate) fn purpose_table(
         rows,
         grouped: false,
     };
+    let table = if has_few { table.without(&["difference established"]) } else { table };
     // Counts of meshes are redundant for one mesh.
-    let table = if is_one { table.without(&["meshes", "difference established"]) } else { table };
+    let table = if is_one { table.without(&["meshes"]) } else { table };
     (!table.rows.is_empty()).then_some(table)
 }
 
@@ -171,21 +181,17 @@ fn within_bound(comparison: &Comparison<'_>) -> Vec<Vec<Cell>> {
         (
             "fewest spheres",
             |record| Some(reached(record)? as f64),
-            |value| counted(value.round() as usize, "sphere", "spheres"),
+            // A count that did not run can be smaller.
+            |value| format!("at most {}", counted(value.round() as usize, "sphere", "spheres")),
             "its spheres",
         ),
         (
             "smallest file",
             stored_numbers,
-            |value| format!("{} numbers", grouped(value.round() as u64)),
+            |value| format!("at most {} numbers", grouped(value.round() as u64)),
             "its numbers",
         ),
-        (
-            "fastest",
-            |record| TOTAL_SECONDS.of(record),
-            |value| format!("{} s", significant(value, 3)),
-            "its time",
-        ),
+        ("fastest", |record| TOTAL_SECONDS.of(record), |value| significant(value, 3), TIME),
     ];
     let mut rows = vec![];
     for (title, cost, text, of) in costs {
@@ -342,11 +348,15 @@ fn row_of(
     let seconds = middle(met.clone().map(|found| found.seconds));
     // A row of the most meshes is not ranked by values.
     let is_by_value = !title.ends_with(MOST_MESHES);
+    let is_time = criterion.of == TIME;
     let mut cells = vec![
         Cell::from(title),
         Cell { best: true, ..Cell::from(comparison.series[first].as_str()) },
-        Cell::optional(ranks[0].median.map(criterion.text)),
-        Cell::optional(seconds.map(|seconds| significant(seconds, 3))),
+        Cell::optional(ranks[0].median.filter(|_| !is_time).map(criterion.text)),
+        Cell::optional(match is_time {
+            true => ranks[0].median.map(criterion.text),
+            false => seconds.map(|seconds| significant(seconds, 3)),
+        }),
         Cell::from(format!("{} of {}", met.count(), counted(known.count(), "mesh", "meshes"))),
     ];
     let runner_up = ranks.get(1).map(|rank| rank.series);
@@ -360,7 +370,6 @@ fn row_of(
         Cell::from(runner_up.map_or("no other", |second| comparison.series[second].as_str())),
         Cell::optional(ratio),
         Cell::optional(pair.map(|pair| match (pair.meshes(), pair.is_established()) {
-            (meshes, _) if meshes < FEWEST => format!("no, n = {meshes} is too few"),
             (meshes, true) => format!("yes, n = {meshes}"),
             (meshes, false) => format!("no, n = {meshes}"),
         })),

@@ -178,17 +178,55 @@ impl<'a> Comparison<'a> {
         here.collect()
     }
 
-    /// Whether the Hausdorff error of an entry is above one of fewer spheres, among the results of its method on its mesh
-    /// at requested counts and error bounds.
-    pub(crate) fn is_rising(&self, entry: &Entry<'_>) -> bool {
+    /// The best result of fewer spheres, if its Hausdorff error is below that of an entry by more than [`RISE`], among the
+    /// results of its method on its mesh at requested counts and error bounds.
+    pub(crate) fn better_with_fewer(&self, entry: &Entry<'_>) -> Option<&Entry<'a>> {
         let point = |entry: &Entry<'_>| {
             let record = entry.record;
             let is_counted = entry.measured() && !record.simplify.level.is_native();
             Some((reached(record).filter(|_| is_counted)? as f64, HAUSDORFF.of(record)?))
         };
-        let own = self.of_mesh(entry.mesh).filter(|other| other.series == entry.series);
-        let points: Vec<(f64, f64)> = own.filter_map(point).collect();
-        point(entry).is_some_and(|own| rises(own, &points))
+        let own = point(entry)?;
+        let others = self.of_mesh(entry.mesh).filter(|other| other.series == entry.series);
+        let fewer = others.filter_map(|other| Some((point(other)?, other)));
+        let fewer = fewer.filter(|(other, _)| rises(own, &[*other]));
+        Some(fewer.min_by(|(a, _), (b, _)| a.1.total_cmp(&b.1).then(a.0.total_cmp(&b.0)))?.1)
+    }
+
+    /// The meaning of [`RISING`] for some entries: both results in words, the largest ratios first; `None` where no smaller
+    /// result is better.
+    pub(crate) fn rising_note<'e>(
+        &self,
+        entries: impl Iterator<Item = &'e Entry<'e>>,
+    ) -> Option<String> {
+        let mut found: Vec<(f64, String)> = entries
+            .filter_map(|entry| {
+                let fewer = self.better_with_fewer(entry)?;
+                let errors = [entry.record, fewer.record].map(|record| HAUSDORFF.of(record));
+                let [more, less] = [errors[0]?, errors[1]?];
+                let [many, few] =
+                    [entry, fewer].map(|e| grouped(reached(e.record).unwrap_or_default() as u64));
+                let mesh = match self.meshes.len() {
+                    1 => String::new(),
+                    _ => format!(" on {}", self.meshes[entry.mesh]),
+                };
+                let method = &self.series[entry.series];
+                let [more_text, less_text] = [more, less].map(|error| HAUSDORFF.format(error));
+                let text =
+                    format!("{method}{mesh}: {less_text} % with {few}, {more_text} % with {many}");
+                Some((less / more, text))
+            })
+            .collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0)); // stable: equal ratios stay in the order of the tables
+        let left = found.len().saturating_sub(MOST_NAMED);
+        let named: Vec<String> = found.into_iter().take(MOST_NAMED).map(|(_, text)| text).collect();
+        let more = if left > 0 { format!("; and {left} more") } else { String::new() };
+        (!named.is_empty()).then(|| {
+            format!(
+                "†: a result with fewer spheres is better. Hausdorff error of {}{more}.",
+                named.join("; ")
+            )
+        })
     }
 
     /// The requested sphere counts, with their level indices, from many to few.
@@ -211,11 +249,15 @@ impl<'a> Comparison<'a> {
             frozen.clone().map(|entry| entry.record.machine.to_string()).collect();
         let machines: Vec<String> = machines.into_iter().collect();
         let name = frozen.clone().find_map(|entry| entry.record.edition.as_deref())?;
-        Some(format!(
+        let mut note = format!(
             "Rows marked ({name}) are frozen results of edition {name} and did not run here. Frozen time: their \
              seconds on {}, which are in no other column and no plot.",
             machines.join("; ")
-        ))
+        );
+        if frozen.clone().any(|entry| entry.record.is_other_version) {
+            note += " Other version: sources or compiler of the method have changed since, so its results here can differ.";
+        }
+        Some(note)
     }
 
     /// The columns of tables: [`COMPARED`], with the seconds of an edition if it has rows.
@@ -258,10 +300,11 @@ impl<'a> Comparison<'a> {
 /// An error that is larger than one of fewer spheres by more than this share is not monotone.
 const RISE: f64 = 0.05;
 
-/// The mark of such an error, and its meaning.
+/// The mark of such an error.
 pub(crate) const RISING: &str = " †";
-pub(crate) const RISING_NOTE: &str =
-    "†: non-monotone, on a mesh more than 5 % above the error with fewer spheres.";
+
+/// Results that the note on such errors names.
+const MOST_NAMED: usize = 4;
 
 /// Whether the error of a result is larger by more than 5 % than one of fewer spheres, among results of one method as
 /// numbers of spheres and errors.
@@ -353,6 +396,9 @@ fn short(hash: &str) -> String {
     hash.chars().take(8).collect()
 }
 
+/// The end of the mark of an edition's row whose method has changed since.
+const OTHER_VERSION: &str = ", other version";
+
 /// The identity of a row: the method with its parameters, and the conditions of the run. Records of two builds, of
 /// two samplings or of two accuracies of measuring are never in one mean.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -368,6 +414,7 @@ struct SeriesKey<'a> {
     samples: usize,
     threads: Option<usize>,
     edition: Option<&'a str>,
+    is_other_version: bool,
     is_external: bool,
 }
 
@@ -400,6 +447,7 @@ impl<'a> SeriesKey<'a> {
             samples: conditions.map_or(0, |c| c.samples),
             threads: simplify.threads,
             edition: record.edition.as_deref(),
+            is_other_version: record.is_other_version,
             is_external,
         }
     }
@@ -436,7 +484,8 @@ impl<'a> SeriesKey<'a> {
 
     fn name(&self) -> String {
         let name = self.variant.map_or_else(|| self.method_and_params(), str::to_owned);
-        self.edition.map_or(name.clone(), |edition| format!("{name} ({edition})"))
+        let other = if self.is_other_version { OTHER_VERSION } else { "" };
+        self.edition.map_or(name.clone(), |edition| format!("{name} ({edition}{other})"))
     }
 
     fn method_and_params(&self) -> String {

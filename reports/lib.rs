@@ -57,6 +57,7 @@ pub use record::{
     file_inside,
 };
 pub use site::write_site;
+pub use tables::without_markup;
 pub use text::{file_stem, printable, significant};
 pub use view3d::View3d;
 pub use write::{ReportError, read_header, results_csv, write_report};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::answers::{by_bound, equal_error_table, usual_level};
-use crate::comparison::{Comparison, RISING, RISING_NOTE, reached, row_name};
+use crate::comparison::{Comparison, RISING, reached, row_name};
 use crate::header::MethodNote;
 use crate::metric::{FROZEN_SECONDS, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
 use crate::record::Record;
@@ -11,9 +11,11 @@ use crate::summary::{CountSummary, SeriesSummary, by_count};
 use crate::tables::{Cell, Table};
 use crate::text::{counted, grouped, printable, shortened};
 
-/// The longest line of the terminal and the longest name of a method there, in characters.
+/// Longest line of the terminal, in characters.
 const WIDTH: usize = 100;
-const NAME: usize = 22;
+
+/// Longest name of a method there, in characters, and the same with the mark of an edition.
+const NAMES: [usize; 2] = [22, 40];
 
 /// The methods with a mean at the requested count nearest to 100, the least error first. Those without one are named in
 /// the last note with the reason. `None` where no method has one.
@@ -70,8 +72,8 @@ pub(crate) fn overview_table(
     if rows.iter().any(|row| row.over < summary.meshes) {
         notes.push("In parentheses: means over fewer meshes, which do not compare.".to_owned());
     }
-    let has_rising = rows.iter().any(|row| row.rising);
-    notes.extend(has_rising.then(|| RISING_NOTE.to_owned()));
+    let here = comparison.entries.iter().filter(|e| e.level == level && e.comparable());
+    notes.extend(comparison.rising_note(here));
     let edition = comparison.edition_note();
     let table = if edition.is_some() { table } else { table.without(&["frozen s"]) };
     let missing: Vec<String> =
@@ -95,7 +97,8 @@ pub fn summary_text(records: &[Record], methods: &[MethodNote]) -> String {
     if let Some(table) = overview_table(&comparison, &by_count(&comparison), methods) {
         // The names and seconds of an edition take its room.
         let is_mixed = comparison.edition_note().is_some();
-        let table = if is_mixed { table.without(&["best suited for"]) } else { table };
+        let left_out: &[&str] = if is_mixed { &["best suited for", "means over"] } else { &[] };
+        let table = table.without(left_out);
         text += &format!("{}\n{}", table.caption, plain(&table));
         table.notes.iter().for_each(|note| text += &wrapped(note));
     }
@@ -109,10 +112,12 @@ pub fn summary_text(records: &[Record], methods: &[MethodNote]) -> String {
 /// The rows below the heads of their columns; the last column has the room that the others leave.
 fn plain(table: &Table) -> String {
     let last = table.columns.len() - 1;
+    // Without a text at the end, names have its room.
+    let name = NAMES[usize::from(table.columns[last].number)];
     let heads: Vec<Cell> = table.columns.iter().map(|c| Cell::from(c.title.as_str())).collect();
     let mut lines: Vec<Vec<String>> = vec![];
     for cells in [&heads].into_iter().chain(&table.rows) {
-        let limit = |k: usize| if k < last { NAME } else { WIDTH };
+        let limit = |k: usize| if k < last { name } else { WIDTH };
         let texts = cells.iter().enumerate();
         lines.push(texts.map(|(k, cell)| shortened(&printable(&cell.text), limit(k))).collect());
     }

@@ -185,6 +185,9 @@ pub struct Record {
     /// The edition that holds this record, where it is a frozen one next to those of a store.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edition: Option<String>,
+    /// Whether this program has another version of the method than the edition.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_other_version: bool,
 }
 
 impl Record {

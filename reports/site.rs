@@ -13,7 +13,7 @@ use crate::pictures::strips;
 use crate::record::{Record, Status};
 use crate::statistics::against_others;
 use crate::tables::{Cell, Table, mesh_table, to_html, topology_word};
-use crate::text::{escape_html, file_stem, file_stems, grouped};
+use crate::text::{escape_html, file_stems, grouped};
 use crate::write::{Files, ReportError, write_report};
 
 /// Writes the site of some records into a folder: the report without medial meshes, and further pages. Pictures and 3D views
@@ -44,8 +44,8 @@ pub fn write_site(
         header: &header,
         stems: file_stems(comparison.meshes.iter().map(String::as_str)),
     };
-    for note in site.methods() {
-        files.write(&method_file(&note.id), site.method_page(note).as_bytes())?;
+    for (note, page) in method_pages(&header, &comparison) {
+        files.write(&page, site.method_page(note).as_bytes())?;
     }
     for (mesh, stem) in site.stems.iter().enumerate() {
         let picture = pictures.get(&mesh).map(|strip| strip.file.as_str());
@@ -59,8 +59,16 @@ pub fn write_site(
 
 const SUBMISSIONS: &str = "submissions.html";
 
-fn method_file(id: &str) -> String {
-    format!("method-{}.html", file_stem(id))
+/// The methods with records and a description, and the file of the page of each.
+pub(crate) fn method_pages<'h>(
+    header: &'h Header,
+    comparison: &Comparison<'_>,
+) -> Vec<(&'h MethodNote, String)> {
+    let mut notes: Vec<&MethodNote> = header.methods.iter().collect();
+    notes.retain(|note| comparison.methods.contains(&note.id.as_str()));
+    let stems = file_stems(notes.iter().map(|note| note.id.as_str()));
+    let files = stems.into_iter().map(|stem| format!("method-{stem}.html"));
+    notes.into_iter().zip(files).collect()
 }
 
 fn mesh_file(stem: &str) -> String {
@@ -75,14 +83,6 @@ struct Site<'a> {
 }
 
 impl Site<'_> {
-    /// The methods with records.
-    fn methods(&self) -> impl Iterator<Item = &MethodNote> {
-        self.header
-            .methods
-            .iter()
-            .filter(|note| self.comparison.methods.contains(&note.id.as_str()))
-    }
-
     /// The page that describes a mesh or a method, by the text of a cell.
     fn link(&self, text: &str) -> Option<String> {
         let comparison = self.comparison;
@@ -90,7 +90,8 @@ impl Site<'_> {
             return Some(mesh_file(&self.stems[mesh]));
         }
         let series = comparison.series.iter().position(|series| series == text)?;
-        Some(method_file(comparison.methods[series]))
+        let pages = method_pages(self.header, comparison).into_iter();
+        pages.filter(|(note, _)| note.id == comparison.methods[series]).map(|(_, page)| page).next()
     }
 
     fn page(&self, title: &str, body: &str) -> String {

@@ -11,7 +11,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::comparison::{Comparison, Entry, RISING, RISING_NOTE, level_label, reached};
+use crate::comparison::{Comparison, Entry, RISING, level_label, reached};
 use crate::header::Header;
 use crate::metric::{
     COMPLETENESS, GEOMETRIC, HAUSDORFF, LARGER_SIDE, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS,
@@ -236,7 +236,7 @@ fn at_count(
             intervals,
             ratio: ratio(&entries, &yardstick),
             topology: topology(&reached),
-            rising: reached.iter().any(|entry| comparison.is_rising(entry)),
+            rising: reached.iter().any(|entry| comparison.better_with_fewer(entry).is_some()),
         });
     }
     CountSummary { count, meshes: meshes.len(), rows }
@@ -398,7 +398,7 @@ pub(crate) fn means_table(
         .text("on", |(_, row)| {
             Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes")))
         });
-    let rising_note = places.iter().any(|(_, row)| row.rising).then_some(RISING_NOTE);
+    let rising_note = comparison.rising_note(comparison.entries.iter().filter(|e| e.comparable()));
     for metric in comparison.columns() {
         rows = rows.number(metric.heading(), |(summary, row)| {
             let mut cell = mean_cell(summary, row, metric);
@@ -424,7 +424,8 @@ pub(crate) fn means_table(
     ];
     Table {
         caption: MEANS.to_owned(),
-        notes: (notes.into_iter().chain(rising_note).map(str::to_owned))
+        notes: (notes.into_iter().map(str::to_owned))
+            .chain(rising_note)
             .chain(comparison.seeds_note())
             .chain(comparison.edition_note())
             .collect(),

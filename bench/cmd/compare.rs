@@ -212,7 +212,7 @@ pub fn run(
     let earlier: Vec<Record> =
         records.iter().filter(|record| !shown.contains(&record.key)).cloned().collect();
     reasons(&earlier).iter().for_each(|reason| print_error(reason));
-    let shown = edition.map(|edition| edition.beside(&study, &records));
+    let shown = edition.map(|edition| edition.beside(&study, &records, registry));
     finish(&records, shown, [run, found], arguments, &files, global)
 }
 

@@ -15,7 +15,7 @@ use crate::exec::{RunError, Supervisor};
 use crate::exit::{Exit, Failure};
 use crate::files;
 use crate::interrupt;
-use crate::output::{note, print_error, print_json, print_raw};
+use crate::output::{note, print_error, print_json, print_markdown};
 use crate::provenance::Provenance;
 use crate::rebuild::records;
 use crate::store::{AXES, RESULTS, Store, claim, is_store, listed};
@@ -88,7 +88,7 @@ pub fn run(
     if global.json {
         print_json(&diff, &[]);
     } else {
-        print_raw(&markdown);
+        print_markdown(&markdown);
     }
     Ok(match diff.count(Meaning::Regression) {
         _ if diff.compared == 0 => Exit::NothingMeasured,

@@ -17,6 +17,7 @@ use crate::output::{counted, note, print_error, print_json, print_line};
 use crate::progress::StageLine;
 use crate::study::edition::Edition;
 use crate::study::external::{AxisOptions, read_axis};
+use crate::study::registry::Registry;
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
@@ -57,7 +58,7 @@ pub struct Arguments {
 ///
 /// # Errors
 /// When the surface or the only medial mesh is refused.
-pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let edition = arguments.against.as_deref().map(Edition::open).transpose()?;
     let options = match &edition {
         Some(edition) => edition.description.judge_options(),
@@ -79,7 +80,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let mut rows: Vec<_> = rows.collect();
     drop(line);
     for row in rows.iter_mut().flatten() {
-        row.place = edition.as_ref().map(|edition| edition.place(&input.hash, &row.evaluation));
+        let place = |edition: &Edition| edition.place(&input.hash, &row.evaluation, registry);
+        row.place = edition.as_ref().map(place);
     }
     let warnings = &input.report.warnings;
     // One file keeps the exit codes and the object of a single evaluation.

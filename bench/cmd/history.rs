@@ -9,7 +9,7 @@ use serde_json::{json, to_value};
 
 use crate::args::{Global, positive};
 use crate::exit::{Exit, Failure};
-use crate::output::{note, print_json, print_line};
+use crate::output::{note, print_json, print_markdown};
 use crate::store::RESULTS;
 
 /// Arguments of `history`.
@@ -26,7 +26,7 @@ pub struct Arguments {
     /// Set the date of the commit, as printed by `git show -s --format=%cI`.
     #[arg(long, value_name = "DATE", requires = "add")]
     date: Option<String>,
-    /// Ignore changes of seconds or memory below this fraction.
+    /// Ignore changes of seconds below this fraction.
     #[arg(long, value_name = "SHARE", value_parser = positive, default_value_t = 0.05)]
     least_step: f64,
 }
@@ -52,7 +52,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         print_json(&object, &warnings);
     } else {
         warnings.iter().for_each(|warning| note(global, &format!("warning: {warning}")));
-        print_line(findings.to_markdown().trim_end());
+        print_markdown(&findings.to_markdown());
     }
     Ok(if findings.regressions == 0 { Exit::Done } else { Exit::Regression })
 }

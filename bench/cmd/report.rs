@@ -8,7 +8,7 @@ use std::time::SystemTime;
 
 use clap::Args;
 use medial::metrics::DEFINITIONS;
-use medial_reports::{Header, Record, Target, editions, read_header, write_records, write_site};
+use medial_reports::{Header, Record, Target, editions, read_header, write_records};
 use serde_json::json;
 
 use crate::args::Global;
@@ -16,7 +16,7 @@ use crate::exit::{Exit, Failure};
 use crate::files;
 use crate::output::{print_json, print_line};
 use crate::provenance::{Provenance, hex_digest};
-use crate::rebuild::{Rebuilt, STUDY, of_items, rebuild, records, write_study};
+use crate::rebuild::{Rebuilt, STUDY, of_items, rebuild, records, write_site_of, write_study};
 use crate::store::{AXES, PAGE, RESULTS, Store, artifact_path};
 use crate::study::edition::{Description, EditionMesh};
 use crate::study::registry::Registry;
@@ -35,7 +35,8 @@ pub struct Arguments {
     /// the edition.
     #[arg(long, value_name = "DIR")]
     freeze: Option<PathBuf>,
-    /// Also write a static site into this folder: the page, and a page for each method and mesh.
+    /// Write a static site into this folder instead, and leave the store unchanged: the page, and a page for each method
+    /// and mesh.
     #[arg(long, value_name = "DIR")]
     site: Option<PathBuf>,
 }
@@ -54,9 +55,24 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         }
         (dirs, Some(out)) => (out, merge(dirs, out)?),
     };
+    // The site of a store leaves the store unchanged, which may be read-only.
+    let is_read = arguments.site.is_some() && arguments.out.is_none();
     // While another process adds records, a page would be outdated at once.
-    let held = dir.is_dir().then(|| Store::open(dir, RESULTS, "medial report")).transpose()?;
-    let Rebuilt { records, shown, files, mut warnings, undrawn } = rebuild(dir, registry)?;
+    let held = (dir.is_dir() && !is_read).then(|| Store::open(dir, RESULTS, "medial report"));
+    let held = held.transpose()?;
+    let mut page = dir.join(PAGE);
+    let mut rebuilt = if is_read { None } else { Some(rebuild(dir, registry)?) };
+    if let Some(site) = &arguments.site {
+        // Somebody else's index.html must not be replaced.
+        let is_empty = fs::read_dir(site).map_or(true, |mut files| files.next().is_none());
+        if !is_empty && !site.join("submissions.html").exists() {
+            return Err(Failure::at(site, "not empty and no earlier site (expected a new folder)"));
+        }
+        let of_site = write_site_of(dir, site, registry)?;
+        page = if is_read { site.join(PAGE) } else { page };
+        rebuilt.get_or_insert(of_site);
+    }
+    let Rebuilt { records, files, mut warnings, undrawn } = rebuilt.expect("one of the two");
     warnings.extend(undrawn);
     if held.as_ref().is_some_and(|store| store.was_cut) {
         warnings
@@ -65,15 +81,6 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     warnings.extend(notes);
     if let Some(edition) = &arguments.freeze {
         freeze(dir, &records, edition, registry)?;
-    }
-    if let Some(site) = &arguments.site {
-        // Somebody else's index.html must not be replaced.
-        let is_empty = fs::read_dir(site).map_or(true, |mut files| files.next().is_none());
-        if !is_empty && !site.join("submissions.html").exists() {
-            return Err(Failure::at(site, "not empty and no earlier site (expected a new folder)"));
-        }
-        let header = read_header(dir).map_err(Failure::input)?;
-        write_site(site, dir, &shown, &header).map_err(Failure::input)?;
     }
     drop(held);
     // The last record of a key counts; those of older builds have none.
@@ -86,7 +93,6 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         for warning in &warnings {
             print_line(&format!("warning: {warning}"));
         }
-        let page = dir.join(PAGE);
         print_line(&format!("{count} records; page: {}", page.display()));
     }
     Ok(Exit::Done)

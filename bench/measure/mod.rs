@@ -251,6 +251,7 @@ pub fn failure_record(
         version: provenance.version.clone(),
         artifact: None,
         edition: None,
+        is_other_version: false,
     }
 }
 

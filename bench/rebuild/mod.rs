@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use jiff::tz::TimeZone;
 use medial_reports::{
     Header, MethodNote, Record, RunNote, Running, Status, read_header, read_records, write_report,
+    write_site,
 };
 use serde_json::json;
 
@@ -19,6 +20,7 @@ use crate::study::edition::Edition;
 use crate::study::external::GIVEN;
 use crate::study::item::Item;
 use crate::study::registry::Registry;
+use crate::study::source::Source;
 
 mod pictures;
 
@@ -37,8 +39,6 @@ pub const STUDY: &str = "study.toml";
 pub struct Rebuilt {
     /// The records.
     pub records: Vec<Record>,
-    /// Those in the report, with the records of an edition.
-    pub shown: Vec<Record>,
     /// The files that were written.
     pub files: Vec<PathBuf>,
     /// Lines without a record.
@@ -52,6 +52,14 @@ pub struct Rebuilt {
 /// # Errors
 /// When the folder has no readable record, or the report cannot be written.
 pub fn rebuild(dir: &Path, registry: &Registry) -> Result<Rebuilt, Failure> {
+    let (records, warnings) = some_records(dir)?;
+    let header = header(dir, &records, registry, &warnings);
+    let items = items_of(dir, registry);
+    write(dir, (records, warnings), (&items, registry), &header, true)
+}
+
+/// The records of a store, at least one, and warnings about lines without a record.
+fn some_records(dir: &Path) -> Result<(Vec<Record>, Vec<String>), Failure> {
     let (records, warnings) = records(dir)?;
     if records.is_empty() {
         let message = match warnings.first() {
@@ -60,12 +68,35 @@ pub fn rebuild(dir: &Path, registry: &Registry) -> Result<Rebuilt, Failure> {
         };
         return Err(Failure { code: Exit::NothingMeasured, message });
     }
+    Ok((records, warnings))
+}
+
+/// Writes the static site of a store, which stays unchanged, into a folder.
+///
+/// # Errors
+/// When the store has no readable record, or the site cannot be written.
+pub fn write_site_of(dir: &Path, site: &Path, registry: &Registry) -> Result<Rebuilt, Failure> {
+    let (records, warnings) = some_records(dir)?;
     let header = header(dir, &records, registry, &warnings);
+    let (records, shown, header) =
+        arranged(dir, records, (&items_of(dir, registry), registry), &header);
+    let undrawn = pictures::draw([dir, site], &shown, &sources(dir));
+    let files = write_site(site, dir, &shown, &header).map_err(Failure::input)?;
+    Ok(Rebuilt { records, files, warnings, undrawn })
+}
+
+/// The items of the study of a store.
+fn items_of(dir: &Path, registry: &Registry) -> Vec<Item> {
     // If meshes or plug-ins of the study are missing, the records stay in their order.
-    let items = Study::read(&dir.join(STUDY))
+    Study::read(&dir.join(STUDY))
         .and_then(|study| study.items(registry, &Provenance::here()))
-        .unwrap_or_default();
-    write(dir, (records, warnings), &items, &header, true)
+        .unwrap_or_default()
+}
+
+/// The sources of the study of a store; none where they cannot be read.
+fn sources(dir: &Path) -> Vec<Source> {
+    let study = Study::read(&dir.join(STUDY)).ok();
+    study.and_then(|study| study.sources().ok()).unwrap_or_default()
 }
 
 /// The report of a run of `compare`, during the run and after it.
@@ -93,8 +124,8 @@ impl RunReport<'_> {
         let is_marked = read_header(self.dir).is_ok_and(|header| header.running.is_some());
         // Byte for byte the same page: a repeated command changes no file.
         if !self.adds && self.dir.join(PAGE).exists() && !is_marked {
-            let (shown, files, undrawn) = (vec![], vec![], vec![]);
-            return Ok(Rebuilt { records, shown, files, warnings, undrawn });
+            let (files, undrawn) = (vec![], vec![]);
+            return Ok(Rebuilt { records, files, warnings, undrawn });
         }
         let mut header = header(self.dir, &records, self.registry, &warnings);
         header.running = running;
@@ -105,24 +136,39 @@ impl RunReport<'_> {
             let now = jiff::Timestamp::now().to_zoned(TimeZone::UTC);
             run.date.get_or_insert_with(|| now.date().to_string());
         }
-        write(self.dir, (records, warnings), self.items, &header, draws)
+        write(self.dir, (records, warnings), (self.items, self.registry), &header, draws)
     }
 }
 
 fn write(
     dir: &Path,
-    (mut records, warnings): (Vec<Record>, Vec<String>),
-    items: &[Item],
+    (records, warnings): (Vec<Record>, Vec<String>),
+    items: (&[Item], &Registry),
     header: &Header,
     draws: bool,
 ) -> Result<Rebuilt, Failure> {
+    let (records, shown, header) = arranged(dir, records, items, header);
+    // Pictures of inputs that can no longer be read stay unchanged.
+    let undrawn =
+        if draws { pictures::draw([dir, dir], &shown, &sources(dir)) } else { Vec::new() };
+    let files = write_report(dir, &shown, &header).map_err(Failure::input)?;
+    Ok(Rebuilt { records, files, warnings, undrawn })
+}
+
+/// The records in the order of the study, those of the report, with an edition's, and the header with notes on these.
+fn arranged(
+    dir: &Path,
+    mut records: Vec<Record>,
+    (items, registry): (&[Item], &Registry),
+    header: &Header,
+) -> (Vec<Record>, Vec<Record>, Header) {
     // Tables follow the order of the records: that of the study, not that of the runs.
     let order = positions(items);
     records.sort_by_key(|record| order.get(&row_of(record)).copied().unwrap_or(usize::MAX));
     let study = Study::read(&dir.join(STUDY)).ok();
     let mut header = header.clone();
     let mixed = study.and_then(|study| match Edition::of(&study) {
-        Ok(edition) => Some(edition?.beside(&study, &records)),
+        Ok(edition) => Some(edition?.beside(&study, &records, registry)),
         // The own results do not depend on it.
         Err(error) => {
             header.notes.push(error.to_string());
@@ -131,15 +177,7 @@ fn write(
     });
     header.notes.extend(mixed.iter().flat_map(|mixed| mixed.notes.clone()));
     let shown = mixed.map_or_else(|| records.clone(), |mixed| mixed.records);
-    let mut undrawn = Vec::new();
-    if draws {
-        // Pictures of inputs that can no longer be read stay unchanged.
-        let study = Study::read(&dir.join(STUDY)).ok();
-        let sources = study.and_then(|study| study.sources().ok()).unwrap_or_default();
-        undrawn = pictures::draw(dir, &shown, &sources);
-    }
-    let files = write_report(dir, &shown, &header).map_err(Failure::input)?;
-    Ok(Rebuilt { records, shown, files, warnings, undrawn })
+    (records, shown, header)
 }
 
 /// The fields that decide the position of a record in its study: mesh, method with parameters, level.

@@ -15,12 +15,13 @@ use crate::study::source::{Input, Source};
 const PANEL: [usize; 2] = [236, 192];
 const ACROSS: usize = 6;
 
-/// Draws the strips of some records into the folder of their report. Strips whose input is missing or changed are
+/// Draws the strips of some records, whose medial meshes are in one folder, into another one. Strips whose input is missing or changed are
 /// skipped, and the reasons returned. Existing strips are not drawn again: their names identify their content.
-pub fn draw(dir: &Path, records: &[Record], sources: &[Source]) -> Vec<String> {
+pub fn draw(dirs: [&Path; 2], records: &[Record], sources: &[Source]) -> Vec<String> {
     let mut strips = picture_strips(records);
     // Names contain a hash of the content: an existing file is the right one.
-    strips.retain(|strip| !dir.join(&strip.file).exists() || !dir.join(strip.view_file()).exists());
+    let is_missing = |file: &str| !dirs.iter().any(|dir| dir.join(file).exists());
+    strips.retain(|strip| is_missing(&strip.file) || is_missing(&strip.view_file()));
     if strips.is_empty() {
         return vec![];
     }
@@ -33,25 +34,29 @@ pub fn draw(dir: &Path, records: &[Record], sources: &[Source]) -> Vec<String> {
         .filter_map(|wanted| {
             // By the hash of the surface that was measured.
             let input = wanted.mesh_hash.as_ref().and_then(|hash| inputs.get(hash));
-            let why = draw_strip(dir, wanted, input).err()?;
+            let why = draw_strip(dirs, wanted, input).err()?;
             Some(format!("no pictures of {}: {why}", wanted.mesh))
         })
         .collect()
 }
 
-fn draw_strip(dir: &Path, wanted: &PictureStrip, input: Option<&Input>) -> Result<(), String> {
+fn draw_strip(
+    [from, to]: [&Path; 2],
+    wanted: &PictureStrip,
+    input: Option<&Input>,
+) -> Result<(), String> {
     let input = input.ok_or("the measured surface is missing or has changed")?;
     let mut axes = Vec::new();
     for (artifact, _) in &wanted.panels {
-        let path = file_inside(dir, artifact);
+        let path = file_inside(from, artifact);
         let path = path.ok_or_else(|| format!("{artifact}: not inside the folder"))?;
         let loaded = medial::complex::read(&path);
         axes.push(loaded.map_err(|error| format!("{}: {error}", path.display()))?.mesh);
     }
     let captions = wanted.panels.iter().map(|(_, caption)| caption.clone());
     let view = View3d::new(&input.mesh, captions.zip(&axes).collect())?;
-    write(&dir.join(&wanted.file), &picture(wanted, input, &axes, &view)?)?;
-    write(&dir.join(wanted.view_file()), view.script(&wanted.view).as_bytes())
+    write(&to.join(&wanted.file), &picture(wanted, input, &axes, &view)?)?;
+    write(&to.join(wanted.view_file()), view.script(&wanted.view).as_bytes())
 }
 
 /// The strip as PNG: medial meshes, and below them the surface with the errors of each.

@@ -17,7 +17,7 @@ use serde_json::json;
 
 use crate::provenance::hex_digest;
 use crate::study::item::{Dual, Item};
-use crate::study::registry::INITIAL;
+use crate::study::registry::{INITIAL, Registry};
 use crate::study::source::did_you_mean;
 use crate::study::{Study, VOLUME_DEPTH, parse_toml};
 
@@ -107,14 +107,16 @@ pub enum EditionError {
     },
     /// Its numbers have other definitions.
     #[error(
-        "edition {name}: measured by version {edition} of the metrics (this program has version {DEFINITIONS}); \
-         choose another edition"
+        "edition {name}: the numbers have other definitions (found version {edition}, expected {DEFINITIONS}); \
+         {advice}"
     )]
     Definitions {
         /// The edition.
         name: String,
         /// Version of its metrics.
         edition: u32,
+        /// Editions of this program with its definitions, or the way to make one.
+        advice: String,
     },
     /// The study measures in another way.
     #[error(
@@ -217,7 +219,8 @@ impl Edition {
             return Err(EditionError::Changed { name, found, expected });
         }
         if description.metrics != DEFINITIONS {
-            return Err(EditionError::Definitions { name, edition: description.metrics });
+            let edition = description.metrics;
+            return Err(EditionError::Definitions { name, edition, advice: alternatives() });
         }
         let unpacked = unpack(&packed).map_err(|error| failed(RECORDS, error.to_string()))?;
         if let Some(line) = unpacked.bad_lines.first() {
@@ -257,8 +260,17 @@ impl Edition {
         }
     }
 
+    /// The methods whose version in this program is another one.
+    pub fn changed_methods(&self, registry: &Registry) -> BTreeSet<String> {
+        let changed = self.records.iter().filter(|record| {
+            let entry = registry.entry(&record.simplify.method);
+            entry.is_some_and(|entry| entry.version("") != record.method_version)
+        });
+        changed.map(|record| record.simplify.method.clone()).collect()
+    }
+
     /// The place of a result among those of the edition on its mesh and near its sphere count, as a sentence.
-    pub fn place(&self, hash: &str, evaluation: &Evaluation) -> String {
+    pub fn place(&self, hash: &str, evaluation: &Evaluation, registry: &Registry) -> String {
         let Description { name, mesh, spheres, .. } = &self.description;
         let own = evaluation.counts.spheres as usize;
         let Some(mesh) = mesh.iter().find(|mesh| mesh.sha256 == hash) else {
@@ -275,14 +287,26 @@ impl Edition {
                 && record.mesh_hash.as_deref() == Some(hash)
                 && record.status.is_ok()
         });
-        let errors =
-            rivals.filter_map(|record| Some(record.evaluate.as_ref()?.distances.hausdorff));
-        let errors: Vec<f64> = errors.collect();
+        let mut changed = self.changed_methods(registry);
+        let mut ranked = BTreeSet::new();
+        let mut errors: Vec<f64> = vec![];
+        for record in rivals {
+            errors.extend(record.evaluate.as_ref().map(|e| e.distances.hausdorff));
+            ranked.insert(record.simplify.method.clone());
+        }
+        changed.retain(|method| ranked.contains(method));
+        let versions = match changed.into_iter().collect::<Vec<_>>() {
+            names if names.is_empty() => String::new(),
+            names if names.len() == ranked.len() => {
+                "; this program has other versions of all these methods".to_owned()
+            }
+            names => format!("; this program has other versions of {}", names.join(", ")),
+        };
         let error = evaluation.distances.hausdorff;
         // The same result read from a file differs in its last digits.
         let rank = 1 + errors.iter().filter(|&&other| other < (1.0 - 1e-9) * error).count();
         format!(
-            "{} %: rank {rank} of {} at {count} spheres on {} ({name})",
+            "{} %: rank {rank} of {} at {count} spheres on {} ({name}{versions})",
             significant(100.0 * error, 3),
             errors.len() + 1,
             mesh.name
@@ -290,8 +314,8 @@ impl Edition {
     }
 
     /// The records of a comparison on meshes of the edition, and the edition's on these meshes at the levels of the study.
-    /// A method that gives the same results in both has its own rows alone.
-    pub fn beside(&self, study: &Study, own: &[Record]) -> Mixed {
+    /// A method that gives the same results in both has its own rows alone. Rows of other versions are marked.
+    pub fn beside(&self, study: &Study, own: &[Record], registry: &Registry) -> Mixed {
         let edition = &self.description;
         // The shortest name of a mesh: noise adds to it, and is not part of the hash.
         let mut names: BTreeMap<&str, &str> = BTreeMap::new();
@@ -318,7 +342,9 @@ impl Edition {
             Target::Published if record.simplify.method == INITIAL => !study.counts_only,
             Target::Published => study.published,
         });
+        let changed = self.changed_methods(registry);
         frozen.retain_mut(|record| {
+            record.is_other_version = changed.contains(&record.simplify.method);
             let name = record.mesh_hash.as_deref().and_then(|hash| names.get(hash));
             record.mesh = name.map_or_else(String::new, |&name| name.to_owned());
             record.edition = Some(edition.name.clone());
@@ -340,8 +366,18 @@ impl Edition {
             .collect();
         let mut repeated: BTreeMap<String, bool> = BTreeMap::new();
         let mut ratios: Vec<f64> = vec![];
+        // By method: number of results here, and the ratios of errors where results differ.
+        let mut errors: BTreeMap<String, (usize, Vec<f64>)> = BTreeMap::new();
         for record in &frozen {
             let own = found.get(&place(record));
+            let error = |record: &Record| Some(record.evaluate.as_ref()?.distances.hausdorff);
+            if let Some((here, there)) = own.and_then(|own| Some((error(own)?, error(record)?))) {
+                let (compared, differing) =
+                    errors.entry(record.simplify.method.clone()).or_default();
+                *compared += 1;
+                let differs = own.is_some_and(|own| own.result_hash != record.result_hash);
+                differing.extend(differs.then(|| here.max(NEGLIGIBLE) / there.max(NEGLIGIBLE)));
+            }
             let own = own.filter(|own| own.result_hash == record.result_hash);
             *repeated.entry(row(record)).or_insert(true) &= own.is_some();
             let total = |record: &Record| Some(record.simplify.seconds?.total).filter(|&s| s > 0.0);
@@ -351,11 +387,25 @@ impl Edition {
         frozen.retain(|record| !repeated[&row(record)]);
         records.extend(frozen);
         let mut notes = vec![];
+        let mean = |ratios: &[f64]| {
+            let sum: f64 = ratios.iter().map(|ratio| ratio.ln()).sum();
+            significant((sum / ratios.len() as f64).exp(), 3)
+        };
+        for (name, (compared, differing)) in &errors {
+            if !differing.is_empty() {
+                notes.push(format!(
+                    "{name}: {} of {compared} results differ from those of edition {}. Hausdorff error here ÷ there: {}, \
+                     geometric mean.",
+                    differing.len(),
+                    edition.name,
+                    mean(differing)
+                ));
+            }
+        }
         if !ratios.is_empty() {
-            let mean = ratios.iter().map(|ratio| ratio.ln()).sum::<f64>() / ratios.len() as f64;
             notes.push(format!(
                 "This machine takes {} times the seconds of edition {}: geometric mean over {} equal results.",
-                significant(mean.exp(), 2),
+                mean(&ratios),
                 edition.name,
                 ratios.len()
             ));
@@ -389,5 +439,23 @@ impl Edition {
             ));
         }
         Mixed { records, notes }
+    }
+}
+
+/// Errors below this share of the diagonal are rounding.
+const NEGLIGIBLE: f64 = 1e-9;
+
+/// The editions of this program with its definitions of the metrics, as advice.
+fn alternatives() -> String {
+    let of = |known: &&Embedded| {
+        let description: Option<Description> = toml::from_str(known.description).ok();
+        description.is_some_and(|description| description.metrics == DEFINITIONS)
+    };
+    let names: Vec<&str> = EDITIONS.iter().filter(of).map(|known| known.name).collect();
+    match names.is_empty() {
+        true => {
+            "omit --against, or freeze results by `medial report DIR --freeze EDITION`".to_owned()
+        }
+        false => format!("use {}", names.join(" or ")),
     }
 }

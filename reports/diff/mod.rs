@@ -8,11 +8,11 @@
 //!    regression only if its confidence interval lies beyond a threshold, and the repetitions agree. Wall-clock seconds
 //!    are shown, but never are a regression.
 
-mod results;
-mod text;
+pub(crate) mod results;
+pub(crate) mod text;
 mod timing;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 use serde_json::Value;
@@ -117,6 +117,9 @@ pub struct Diff {
     pub options: DiffOptions,
     /// Pairs that were compared.
     pub compared: usize,
+    /// Number of meshes that each method was compared on.
+    #[serde(skip)]
+    meshes: BTreeMap<String, usize>,
     /// Results of the older set alone.
     pub missing: Vec<ItemName>,
     /// Results of the newer set alone.
@@ -146,6 +149,7 @@ impl Diff {
             sides: [side(first, old), side(second, new)],
             options,
             compared: both.len(),
+            meshes: meshes_of(both.iter().map(|pair| &pair.item)),
             missing,
             added,
             unlike,
@@ -155,17 +159,32 @@ impl Diff {
         }
     }
 
-    /// How many changes and timings have a meaning.
+    /// Number of results with a change of a meaning, and of methods with a timing of it.
     pub fn count(&self, meaning: Meaning) -> usize {
-        let changes = self.changes.iter().filter(|change| change.meaning == meaning).count();
-        let timings = self.timings.iter().filter(|timing| timing.meaning == Some(meaning)).count();
-        changes + timings
+        let of = |change: &&Change| change.meaning == meaning;
+        let timings = self.timings.iter().filter(|timing| timing.meaning == Some(meaning));
+        let methods: BTreeSet<&str> = timings.map(|timing| timing.method.as_str()).collect();
+        items(self.changes.iter().filter(of)).len() + methods.len()
     }
 
     /// The difference as Markdown, for a pull request.
     pub fn to_markdown(&self) -> String {
         text::markdown(self)
     }
+}
+
+/// Number of meshes of each method.
+pub(crate) fn meshes_of<'i>(items: impl Iterator<Item = &'i ItemName>) -> BTreeMap<String, usize> {
+    let mut meshes: BTreeMap<String, BTreeSet<&str>> = BTreeMap::new();
+    for item in items {
+        meshes.entry(item.method.clone()).or_default().insert(&item.mesh);
+    }
+    meshes.into_iter().map(|(method, meshes)| (method, meshes.len())).collect()
+}
+
+/// The results of some changes, each once.
+pub(crate) fn items<'c>(changes: impl Iterator<Item = &'c Change>) -> BTreeSet<&'c ItemName> {
+    changes.map(|change| &change.item).collect()
 }
 
 fn side(name: String, records: &[Record]) -> Side {

@@ -118,44 +118,64 @@ const NEGLIGIBLE: f64 = 1e-9;
 const LEAST_MEMORY: f64 = 1e6;
 
 /// Key of the peak of memory.
-const MEMORY: &str = "simplify.peak_bytes";
+pub(super) const MEMORY: &str = "simplify.peak_bytes";
+
+/// Key of the number of spheres under an error bound, where it is the result.
+const BOUNDED: &str = "simplify.spheres within the error";
+
+/// Values of a result by key.
+pub(crate) type Facts = BTreeMap<String, Value>;
 
 /// The changes from one record to the other. Time linear in the length of the records.
 pub(super) fn changes(pair: &Pair<'_>, options: &DiffOptions) -> Vec<Change> {
-    let mut changes = vec![];
-    let (old, mut new) = (facts(pair.old), facts(pair.new)); // sorted by key
-    for (what, old) in old {
-        let new = new.remove(&what).unwrap_or(Value::Null);
-        if old != new {
-            changes.push(change(pair, what, old, new, options));
-        }
-    }
-    let appeared = new.into_iter().filter(|(_, value)| !value.is_null());
-    changes.extend(appeared.map(|(what, new)| change(pair, what, Value::Null, new, options)));
+    let expected = [pair.old, pair.new].map(expected_betti);
+    let mut changes = compare(&pair.item, [facts(pair.old), facts(pair.new)], expected, options);
     // With several threads memory is not quite the same each time: within its threshold it is not listed.
     changes.retain(|change: &Change| change.what != MEMORY || change.meaning != Meaning::Changed);
     changes
 }
 
-fn change(pair: &Pair<'_>, what: String, old: Value, new: Value, options: &DiffOptions) -> Change {
-    let relative = match (old.as_f64(), new.as_f64()) {
-        (Some(old), Some(new)) if old != 0.0 => Some((new - old) / old.abs()),
-        _ => None,
+/// The changes from the older to the newer facts of a result.
+pub(crate) fn compare(
+    item: &ItemName,
+    [old, mut new]: [Facts; 2],
+    expected: [Value; 2],
+    options: &DiffOptions,
+) -> Vec<Change> {
+    let mut changes = vec![];
+    let mut add = |what: String, old: Value, new: Value| {
+        let relative = match (old.as_f64(), new.as_f64()) {
+            (Some(old), Some(new)) if old != 0.0 => Some((new - old) / old.abs()),
+            _ => None,
+        };
+        let meaning = meaning(&what, [&old, &new], &expected, options);
+        changes.push(Change { item: item.clone(), what, old, new, relative, meaning });
     };
-    let meaning = meaning(pair, &what, [&old, &new], options);
-    Change { item: pair.item.clone(), what, old, new, relative, meaning }
+    for (what, old) in old {
+        let new = new.remove(&what).unwrap_or(Value::Null);
+        if old != new {
+            add(what, old, new);
+        }
+    }
+    let appeared = new.into_iter().filter(|(_, value)| !value.is_null());
+    appeared.for_each(|(what, new)| add(what, Value::Null, new));
+    changes
 }
 
 /// The direction of a quantity's change.
-fn meaning(pair: &Pair<'_>, what: &str, [old, new]: [&Value; 2], options: &DiffOptions) -> Meaning {
+fn meaning(
+    what: &str,
+    [old, new]: [&Value; 2],
+    expected: &[Value; 2],
+    options: &DiffOptions,
+) -> Meaning {
     let key = what.strip_prefix("evaluate.").unwrap_or(what);
-    let is_bounded = matches!(pair.old.simplify.level, Target::MaxError(_));
+    let is_ok = |status: &Value| ["ok", "external"].iter().any(|ok| status == ok);
     match key {
-        "status" => of_truth(pair.old.status.is_ok(), pair.new.status.is_ok()),
-        "betti" | "union.betti" => of_truth(is_expected(pair.old, old), is_expected(pair.new, new)),
+        "status" => of_truth(is_ok(old), is_ok(new)),
+        "betti" | "union.betti" => of_truth(*old == expected[0], *new == expected[1]),
         MEMORY => of_size(old, new, options.memory, LEAST_MEMORY),
-        // Under an error bound the number of spheres is the result.
-        "simplify.spheres" if is_bounded => of_size(old, new, 0.0, 0.5),
+        BOUNDED => of_size(old, new, 0.0, 0.5),
         key if METRICS.iter().any(|metric| metric.is_gate && metric.path == key) => {
             of_size(old, new, options.error, NEGLIGIBLE)
         }
@@ -163,10 +183,10 @@ fn meaning(pair: &Pair<'_>, what: &str, [old, new]: [&Value; 2], options: &DiffO
     }
 }
 
-/// Whether Betti numbers are those of the solid.
-fn is_expected(record: &Record, betti: &Value) -> bool {
+/// The Betti numbers of the solid; `false`, which equals none, where they are unknown.
+pub(crate) fn expected_betti(record: &Record) -> Value {
     let expected = record.evaluate.as_ref().and_then(|evaluation| evaluation.expected_betti);
-    expected.is_some_and(|expected| *betti == Value::from(expected.to_vec()))
+    expected.map_or(Value::Bool(false), |expected| Value::from(expected.to_vec()))
 }
 
 fn of_truth(before: bool, now: bool) -> Meaning {
@@ -204,20 +224,38 @@ const COMPARED: [&str; 12] = [
     "initial",
 ];
 
+/// The values of a record whose changes have a direction, and the hash of its result.
+pub(crate) fn gates(record: &Record) -> Facts {
+    let mut gates = facts(record);
+    let compared = |key: &str| {
+        let metric = key.strip_prefix("evaluate.").unwrap_or_default();
+        ["status", "result_hash", "simplify.spheres", BOUNDED, MEMORY].contains(&key)
+            || ["betti", "union.betti"].contains(&metric)
+            || METRICS.iter().any(|known| known.is_gate && known.path == metric)
+    };
+    gates.retain(|key, value| compared(key) && !value.is_null());
+    gates
+}
+
 /// Every compared number of a record, by key.
-fn facts(record: &Record) -> BTreeMap<String, Value> {
-    let mut facts = BTreeMap::new();
+fn facts(record: &Record) -> Facts {
+    let mut facts = Facts::new();
     // A record that was read from JSON can be written as such.
     let whole = serde_json::to_value(record).unwrap_or_default();
     for path in COMPARED {
         let value = whole.pointer(&format!("/{path}")).cloned().unwrap_or_default();
         take_apart(&path.replace('/', "."), value, &mut facts);
     }
+    if matches!(record.simplify.level, Target::MaxError(_))
+        && let Some(spheres) = facts.remove("simplify.spheres")
+    {
+        facts.insert(BOUNDED.to_owned(), spheres);
+    }
     facts
 }
 
 /// Objects by their keys, lists of objects by their places; other lists are one value.
-fn take_apart(key: &str, value: Value, facts: &mut BTreeMap<String, Value>) {
+fn take_apart(key: &str, value: Value, facts: &mut Facts) {
     match value {
         Value::Object(map) => {
             for (field, value) in map {

@@ -1,8 +1,12 @@
 //! A difference as Markdown: the summary line first, then the evidence.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use serde_json::Value;
 
+use super::results::MEMORY;
 use super::{Change, Diff, ItemName, Meaning, Unlike};
+use crate::metric::METRICS;
 use crate::tables::{Cell, Table, escape, left_out, to_markdown};
 use crate::text::{counted, significant};
 
@@ -13,7 +17,7 @@ const MOST_ROWS: usize = 40;
 const MOST_NAMES: usize = 5;
 
 pub(super) fn markdown(diff: &Diff) -> String {
-    let mut text = format!("# {}\n\n{}\n\n", heading(diff), sides(diff));
+    let mut text = format!("{}\n\n{}\n\n", heading(diff), sides(diff));
     for (meaning, caption) in [
         (Meaning::Regression, "Worse"),
         (Meaning::Improvement, "Better"),
@@ -43,19 +47,96 @@ pub(super) fn markdown(diff: &Diff) -> String {
 }
 
 fn heading(diff: &Diff) -> String {
+    let worse = diff.changes.iter().filter(|change| change.meaning == Meaning::Regression);
+    let slower = diff.timings.iter().filter(|timing| timing.meaning == Some(Meaning::Regression));
+    let slower = slower.map(|timing| (timing.method.clone(), timing.mesh.clone(), timing.ratio));
+    let summary = match headline(&worse.collect::<Vec<_>>(), slower.collect(), &diff.meshes) {
+        Some(summary) => summary,
+        None if diff.compared == 0 => "Nothing could be compared".to_owned(),
+        None => "No regression".to_owned(),
+    };
     let [worse, better, changed] = [Meaning::Regression, Meaning::Improvement, Meaning::Changed]
         .map(|meaning| diff.count(meaning));
-    let summary = match worse {
-        0 if diff.compared == 0 => "Nothing could be compared".to_owned(),
-        0 => "No regression".to_owned(),
-        worse => counted(worse, "regression", "regressions"),
-    };
-    let compared = counted(diff.compared, "result", "results");
-    let better = counted(better, "improvement", "improvements");
     format!(
-        "{summary}; {better}, {}, among {compared}",
-        counted(changed, "other change", "other changes")
+        "# {}\n\n{}, {}, {} among {}.",
+        escape(&summary),
+        counted(worse, "regression", "regressions"),
+        counted(better, "improvement", "improvements"),
+        counted(changed, "result changed otherwise", "results changed otherwise"),
+        counted(diff.compared, "result", "results"),
     )
+}
+
+/// A sentence on changes for the worse, and on slower methods as method, mesh and ratio of seconds; `None` without any.
+/// `meshes` has the number of compared meshes of each method.
+pub(crate) fn headline(
+    worse: &[&Change],
+    slower: Vec<(String, Option<String>, f64)>,
+    meshes: &BTreeMap<String, usize>,
+) -> Option<String> {
+    let mut clauses = vec![];
+    let mut of_methods: BTreeMap<&str, Vec<&Change>> = BTreeMap::new();
+    for &change in worse {
+        of_methods.entry(&change.item.method).or_default().push(change);
+    }
+    for (method, changes) in of_methods {
+        let of = |what: &str| -> Vec<&Change> {
+            changes.iter().copied().filter(|change| change.what == what).collect()
+        };
+        // The quantity that matters most, in words.
+        let first = ["status", "evaluate.betti", "evaluate.hausdorff"].into_iter();
+        let what = first.chain([changes[0].what.as_str()]).find(|what| !of(what).is_empty())?;
+        let word = match what {
+            "status" => "result lost".to_owned(),
+            "evaluate.betti" => "topology lost".to_owned(),
+            _ => format!("{}{}", word(what), range(&of(what))),
+        };
+        let on: BTreeSet<&str> = changes.iter().map(|change| &*change.item.mesh).collect();
+        let all = meshes.get(method).copied().unwrap_or(on.len());
+        let all = counted(all, "mesh", "meshes");
+        clauses.push(format!("{method} worse on {} of {all}, {word}", on.len()));
+    }
+    let mut times: BTreeMap<String, (Option<String>, f64)> = BTreeMap::new();
+    for (method, mesh, ratio) in slower {
+        let largest = times.entry(method).or_insert((mesh.clone(), ratio));
+        // The row over all meshes represents its method.
+        if largest.0.is_some() && (mesh.is_none() || ratio > largest.1) {
+            *largest = (mesh, ratio);
+        }
+    }
+    for (method, (mesh, ratio)) in times {
+        let on = mesh.map_or_else(String::new, |mesh| format!(" on {mesh}"));
+        clauses.push(match ratio {
+            2.0.. => format!("{method} {ratio:.1} times slower{on}"),
+            _ => format!("{method} {:.0} % slower{on}", 100.0 * (ratio - 1.0)),
+        });
+    }
+    (!clauses.is_empty()).then(|| clauses.join("; "))
+}
+
+/// The name of a quantity in a sentence.
+fn word(what: &str) -> String {
+    let path = what.strip_prefix("evaluate.").unwrap_or(what);
+    let metric = METRICS.iter().find(|metric| metric.path == path);
+    match metric {
+        Some(metric) => metric.title.to_owned(),
+        None if what == MEMORY => "memory".to_owned(),
+        None => what.rsplit('.').next().unwrap_or(what).to_owned(),
+    }
+}
+
+/// The least and largest relative change: ` +10 to +68 %`.
+fn range(changes: &[&Change]) -> String {
+    let shares = changes.iter().filter_map(|change| change.relative);
+    let mut shares: Vec<String> = {
+        let mut sorted: Vec<f64> = shares.collect();
+        sorted.sort_by(f64::total_cmp);
+        let ends = sorted.first().into_iter().chain(sorted.last());
+        ends.map(|share| format!("{:+}", significant(100.0 * share, 2).parse().unwrap_or(0.0_f64)))
+            .collect()
+    };
+    shares.dedup();
+    if shares.is_empty() { String::new() } else { format!(" {} %", shares.join(" to ")) }
 }
 
 /// Both sets: name, builds, machines.
@@ -88,7 +169,7 @@ fn change_table(caption: &str, changes: &[&Change]) -> Table {
     }
 }
 
-fn shown(value: &Value) -> String {
+pub(crate) fn shown(value: &Value) -> String {
     match value {
         Value::Null => "none".to_owned(), // appeared or vanished
         Value::String(text) => text.chars().take(16).collect(),

@@ -1,9 +1,9 @@
 //! The findings as Markdown.
 
-use serde_json::Value;
-
-use super::{Change, Findings};
-use crate::tables::{Cell, Table, left_out, to_markdown};
+use super::{DatedChange, Findings};
+use crate::diff::Meaning;
+use crate::diff::text::shown;
+use crate::tables::{Cell, Table, escape, left_out, to_markdown};
 use crate::text::{counted, significant};
 
 /// More rows of one kind are counted, not listed: the JSON has them all.
@@ -12,9 +12,9 @@ const MOST_ROWS: usize = 40;
 impl Findings<'_> {
     /// The findings as Markdown: regressions of the newest run first.
     pub fn to_markdown(&self) -> String {
-        let mut text = format!("# {}\n\n{}\n", self.title(), self.summary());
+        let mut text = format!("# {}\n\n{}\n", escape(&self.title()), escape(&self.summary()));
         for line in self.settings() {
-            text.push_str(&format!("- {line}\n"));
+            text.push_str(&format!("- {}\n", escape(&line)));
         }
         for table in self.tables() {
             text.push_str(&format!("\n{}", to_markdown(&table)));
@@ -22,19 +22,29 @@ impl Findings<'_> {
         text
     }
 
+    /// The regressions of the newest run.
     fn title(&self) -> String {
-        let series = counted(self.tracks.len(), "series", "series");
-        format!("History: {}, {series}", counted(self.runs.len(), "run", "runs"))
+        match (&self.headline, self.compared) {
+            (Some(headline), _) => headline.clone(),
+            (None, 0) if self.runs.len() == 1 => "First run, nothing to compare".to_owned(),
+            (None, 0) => {
+                "Nothing to compare: no earlier run of this machine and these settings".to_owned()
+            }
+            (None, _) => "No regression".to_owned(),
+        }
     }
 
-    /// The findings of the newest run, in one sentence.
     fn summary(&self) -> String {
         let Some(newest) = self.runs.last() else { return "No run yet.".to_owned() };
-        let run = format!("Newest run, {} ({})", newest.date, short(&newest.commit));
-        match self.regressions {
-            0 => format!("{run}: no regression."),
-            count => format!("{run}: {}.", counted(count, "regression", "regressions")),
-        }
+        format!(
+            "Newest run, {} ({}): {} among {} with an earlier run. The history has {} of {}.",
+            newest.date,
+            short(&newest.commit),
+            counted(self.regressions, "regression", "regressions"),
+            counted(self.compared, "result", "results"),
+            counted(self.runs.len(), "run", "runs"),
+            counted(self.tracks.len(), "series", "series"),
+        )
     }
 
     /// Machines and conditions, where there are several.
@@ -52,46 +62,45 @@ impl Findings<'_> {
     }
 
     fn tables(&self) -> Vec<Table> {
-        let kinds: [(&str, Vec<&Change>); 3] = [
+        let kinds: [(&str, Vec<&DatedChange>); 3] = [
             ("Regressions of the newest run", self.news().collect()),
-            ("Change points of seconds and memory", self.change_points.iter().collect()),
+            ("Change points of seconds", self.change_points.iter().collect()),
             ("Results that changed", self.changes.iter().collect()),
         ];
         kinds.into_iter().filter(|(_, changes)| !changes.is_empty()).map(table).collect()
     }
 }
 
-fn table((caption, changes): (&str, Vec<&Change>)) -> Table {
-    let shown = |value: &Value| match value.as_str() {
-        Some(text) => text.to_owned(),
-        None => value.as_f64().map_or("–".to_owned(), |number| significant(number, 4)),
-    };
+fn table((caption, changes): (&str, Vec<&DatedChange>)) -> Table {
     let rows = Table::of(&changes[..changes.len().min(MOST_ROWS)])
-        .text("run", |change| change.first_after.date.clone())
-        .text("commits", |change| {
-            let commits = [&change.last_before, &change.first_after];
+        .text("run", |dated| dated.first_after.date.clone())
+        .text("commits", |dated| {
+            let commits = [&dated.last_before, &dated.first_after];
             commits.map(|run| short(&run.commit)).join("..")
         })
-        .text("series", |change| change.series.clone())
-        .text("what", |change| change.what)
-        .text("change", move |change| format!("{} → {}", shown(&change.from), shown(&change.to)))
-        .text("size", |change| change.ratio.map_or(String::new(), percent))
-        .text("", |change| match (change.shared, change.worse) {
+        .text("series", |dated| {
+            let item = &dated.change.item;
+            format!("{} · {} · {}", item.mesh, item.method, item.level)
+        })
+        .text("what", |dated| dated.change.what.clone())
+        .text("change", |dated| [&dated.change.old, &dated.change.new].map(shown).join(" → "))
+        .text("size", |dated| dated.change.relative.map_or(String::new(), percent))
+        .text("", |dated| match (dated.shared, dated.change.meaning) {
             (true, _) => Cell::from("most series: the machine or the compiler"),
-            (false, true) => Cell { best: true, ..Cell::from("worse") },
-            (false, false) => Cell::from(""),
+            (false, Meaning::Regression) => Cell { best: true, ..Cell::from("worse") },
+            (false, _) => Cell::from(""),
         });
     Table {
-        caption: format!("{caption}: {}", changes.len()),
+        caption: format!("{caption}: {}", counted(changes.len(), "change", "changes")),
         notes: left_out(changes.len(), MOST_ROWS),
         ..rows.table
     }
 }
 
-/// A ratio as a change in percent: `+10.3 %`.
-fn percent(ratio: f64) -> String {
-    let sign = if ratio < 1.0 { '−' } else { '+' };
-    let size = 100.0 * (ratio - 1.0).abs();
+/// A share as a change in percent: `+10.3 %`.
+fn percent(share: f64) -> String {
+    let sign = if share < 0.0 { '−' } else { '+' };
+    let size = 100.0 * share.abs();
     // Errors of six digits change by less than a decimal shows.
     let digits = if size < 0.05 { significant(size, 2) } else { format!("{size:.1}") };
     format!("{sign}{digits} %")

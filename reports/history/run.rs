@@ -10,13 +10,14 @@ use std::{fs, io};
 
 use medial::{parser_message, read_regular_text};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::comparison::row_name;
+use crate::diff::results::{Facts, expected_betti, gates};
 use crate::journal::replace_file;
 use crate::metric::median;
 use crate::record::{Machine, Record, Stages, Status};
 use crate::text::printable;
-use medial::metrics::Evaluation;
 
 /// Why a run cannot be stored, or a history cannot be read: the file or option, and its problem.
 #[derive(Debug, thiserror::Error)]
@@ -63,18 +64,12 @@ pub struct Point {
     /// CPU seconds of the method without shared substrates, median over the repetitions. For the initial medial mesh,
     /// whose work the substrates are, with them.
     pub seconds: Option<f64>,
-    /// Peak memory.
-    pub bytes: Option<u64>,
-    /// Two-sided Hausdorff error, a fraction of the diagonal.
-    pub hausdorff: Option<f64>,
-    /// Mean error, a fraction of the diagonal.
-    pub mean: Option<f64>,
-    /// Spheres of the result.
-    pub spheres: Option<u64>,
-    /// Whether the Betti numbers are those of the solid.
-    pub topology: Option<bool>,
-    /// First digits of the result's hash.
-    pub result: Option<String>,
+    /// The values whose changes have a direction, and the result's hash, by key.
+    #[serde(default)]
+    pub gates: Facts,
+    /// Betti numbers of the solid.
+    #[serde(default)]
+    pub expected_betti: Value,
 }
 
 impl Run {
@@ -193,7 +188,6 @@ pub fn read_runs(folder: &Path) -> Result<(Vec<Run>, Vec<HistoryError>), History
 
 impl Point {
     fn of(record: &Record) -> Self {
-        let evaluation = record.evaluate.as_ref();
         let method = record.simplify.method.as_str();
         let repetitions = record.repetitions.iter().map(|r| own_seconds(method, &r.cpu_seconds));
         let seconds = median(&repetitions.collect::<Vec<f64>>())
@@ -207,12 +201,8 @@ impl Point {
             seconds: seconds
                 .filter(|_| record.status.has_result() && record.ran_alone())
                 .and_then(|s| rounded(s, 4)),
-            bytes: record.simplify.peak_bytes,
-            hausdorff: evaluation.and_then(|e| rounded(e.distances.hausdorff, 6)),
-            mean: evaluation.and_then(|e| rounded(e.distances.mean, 6)),
-            spheres: record.simplify.spheres.map(|spheres| spheres as u64),
-            topology: evaluation.and_then(Evaluation::has_right_topology),
-            result: record.result_hash.as_deref().map(first_digits),
+            gates: gates(record).into_iter().map(|(key, value)| (key, shortened(value))).collect(),
+            expected_betti: expected_betti(record),
         }
     }
 }
@@ -225,6 +215,15 @@ fn own_seconds(method: &str, stages: &Stages) -> f64 {
 /// A finite number with `digits` significant digits: more would only make the files large.
 fn rounded(value: f64, digits: usize) -> Option<f64> {
     format!("{:.*e}", digits - 1, value).parse().ok().filter(|value: &f64| value.is_finite())
+}
+
+/// Six significant digits of an error, twelve of a hash: more would only make the files large.
+fn shortened(value: Value) -> Value {
+    match value {
+        Value::String(text) if text.len() == 64 => first_digits(&text).into(),
+        value if value.is_f64() => value.as_f64().and_then(|number| rounded(number, 6)).into(),
+        value => value,
+    }
 }
 
 fn first_digits(hash: &str) -> String {

@@ -14,12 +14,14 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use serde_json::{Value, json};
 
+use crate::answers::usual_level;
 use crate::comparison::{Comparison, level_label};
 use crate::header::{Header, MethodNote, RunNote};
 use crate::metric::{BELOW_30, COMPARED, EPSILON, Metric, SPHERES_ONLY};
 use crate::pictures::widest_spread;
 use crate::plots::{Figure, symbol};
 use crate::record::Machine;
+use crate::site::method_pages;
 use crate::tables::Table;
 use crate::text::{betti, counted, escape_html, grouped, printable};
 
@@ -163,7 +165,7 @@ impl Page<'_> {
         let figures = self.meshes.iter().map(|mesh| figures(&mesh.figures));
         json!({
             "rows": if is_shown { count } else { 0 },
-            "columns": if is_shown { records::all_columns(self.comparison) } else { Default::default() },
+            "columns": if is_shown { records::all_columns(self.comparison, self.header.is_site) } else { Default::default() },
             "figures": figures.collect::<Vec<_>>(),
         })
     }
@@ -186,11 +188,17 @@ impl Page<'_> {
             let tables: Vec<Table> = tables.iter().map(without_command).collect();
             sections.push(json!({"id": id, "title": title, "tables": tables}));
         }
+        let pages = if header.is_site { method_pages(header, comparison) } else { vec![] };
         let methods = header
             .methods
             .iter()
             .filter(|note| comparison.methods.contains(&note.id.as_str()))
-            .map(described);
+            .map(|note| {
+                let mut method = described(note);
+                let page = pages.iter().find(|(other, _)| other.id == note.id);
+                method["page"] = json!(page.map(|(_, file)| format!("./{file}")));
+                method
+            });
         let runs = &header.runs;
         let command = runs.last().map(|run| &run.command).filter(|command| !command.is_empty());
         let pictured = (self.meshes.iter().enumerate())
@@ -326,6 +334,10 @@ impl Page<'_> {
             "brief": brief,
             "measured": entries().any(|entry| entry.measured()),
             "picture": part.picture,
+            "fewer": usual_level(comparison).and_then(|(level, _)| {
+                let note = comparison.rising_note(entries().filter(|entry| entry.level == level));
+                Some(note?.replace("†: a", "A"))
+            }),
             "view": view.map(|view| json!({"name": view.name, "file": format!("./{}", view.file)})),
             "initial": initial,
         })

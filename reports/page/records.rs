@@ -14,7 +14,11 @@ pub(super) const MOST: usize = 20_000;
 
 /// The columns of all entries by path, null where a record has no value. Below `table` are those of the table of
 /// results, below the names of a record's parts its values as recorded.
-pub(super) fn all_columns(comparison: &Comparison<'_>) -> BTreeMap<String, Vec<Value>> {
+/// A site has no medial meshes that rows could link.
+pub(super) fn all_columns(
+    comparison: &Comparison<'_>,
+    is_site: bool,
+) -> BTreeMap<String, Vec<Value>> {
     let mut best: Option<(usize, Best)> = None;
     let mut columns: BTreeMap<String, Vec<Value>> = BTreeMap::new();
     for (index, entry) in comparison.entries.iter().enumerate() {
@@ -23,7 +27,9 @@ pub(super) fn all_columns(comparison: &Comparison<'_>) -> BTreeMap<String, Vec<V
             Some((mesh, best)) if *mesh == entry.mesh => best,
             slot => &mut slot.insert((entry.mesh, Best::of_mesh(comparison, entry.mesh))).1,
         };
-        for (path, value) in row(comparison, entry, best) {
+        let mut row = row(comparison, entry, best);
+        row.retain(|(path, _)| !is_site || path != "table/link");
+        for (path, value) in row {
             let empty = || vec![Value::Null; comparison.entries.len()];
             columns.entry(path).or_insert_with(empty)[index] = value;
         }
@@ -59,7 +65,7 @@ fn row(comparison: &Comparison<'_>, entry: &Entry<'_>, best: &Best) -> Vec<(Stri
         ("status", json!(record.status.to_string())),
         ("spheres", json!(reached(record))),
         ("topology", json!(topology_word(entry))),
-        ("rising", json!(comparison.is_rising(entry).then_some(1))),
+        ("rising", json!(comparison.better_with_fewer(entry).map(|_| 1))),
         ("remark", json!(remark(entry))),
         ("link", json!(record.artifact.as_deref().and_then(local_link))),
         ("warnings", if warnings.is_empty() { Value::Null } else { json!(warnings) }),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use medial::metrics::Evaluation;
 
-use crate::comparison::{Comparison, Entry, RISING, RISING_NOTE, level_label, reached};
+use crate::comparison::{Comparison, Entry, RISING, level_label, reached};
 use crate::metric::{COMPARED, HAUSDORFF, Metric};
 use crate::summary::pick;
 use crate::tables::{Cell, Table};
@@ -81,7 +81,9 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
     for metric in comparison.columns() {
         rows = rows.number(metric.heading(), |entry| match metric.of(entry.record) {
             Some(value) => {
-                let mark = if metric.key == HAUSDORFF.key && comparison.is_rising(entry) {
+                let mark = if metric.key == HAUSDORFF.key
+                    && comparison.better_with_fewer(entry).is_some()
+                {
                     RISING
                 } else {
                     ""
@@ -117,9 +119,7 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
         ));
     }
     notes.push(UNITS.to_owned());
-    if entries.iter().any(|entry| comparison.is_rising(entry)) {
-        notes.push(RISING_NOTE.to_owned());
-    }
+    notes.extend(comparison.rising_note(entries.iter()));
     notes.extend(comparison.seeds_note());
     notes.extend(comparison.edition_note());
     Table {

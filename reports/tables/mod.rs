@@ -229,6 +229,20 @@ pub(crate) fn escape(text: &str) -> String {
     text.chars().flat_map(|c| is_markup(c).then_some('\\').into_iter().chain([c])).collect()
 }
 
+/// Markdown of this program as a terminal shows it: without escapes and emphasis.
+pub fn without_markup(markdown: &str) -> String {
+    let mut text = String::new();
+    let mut letters = markdown.chars();
+    while let Some(letter) = letters.next() {
+        match letter {
+            '\\' => text.extend(letters.next()),
+            '*' => {} // an own one is escaped
+            letter => text.push(letter),
+        }
+    }
+    text.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&")
+}
+
 /// Rules in the manner of booktabs for documents that do not load it.
 const RULES: &str = "\\providecommand{\\toprule}{\\hline}\n\
                      \\providecommand{\\midrule}{\\hline}\n\
@@ -343,6 +357,14 @@ mod tests {
     fn latex_spells_characters_that_pdflatex_cannot_set() {
         assert_eq!(escape_latex("÷ ≤ λ é"), "$\\div$ $\\le$ $\\lambda$ é");
         assert_eq!(escape_latex("日_%"), "U+65E5\\_\\%");
+    }
+
+    #[test]
+    fn markup_is_left_out_on_a_terminal() {
+        for text in ["x86_64", "a*b\\c [d] <e> & |f| #1 ~ $ `g`", "&lt;"] {
+            assert_eq!(without_markup(&escape(text)), text);
+        }
+        assert_eq!(without_markup("# x86\\_64 is **worse**"), "# x86_64 is worse");
     }
 
     #[test]

@@ -2,14 +2,17 @@
 
 use medial::complex::{self, MaErrorKind};
 use medial::surface::{self, Fault, Repair};
-use medial_test_support::{medial_meshes, table};
+use medial_test_support::{free_meshes, medial_meshes, table};
 
 #[test]
 fn good_meshes_match_the_manifest() {
-    let Some(folder) = medial_test_support::meshes() else { return };
-    let rows = table(&folder.join("MANIFEST.csv"));
-    assert!(rows.len() >= 12);
-    for row in rows {
+    let folders = medial_test_support::meshes().into_iter().chain([free_meshes()]);
+    let rows = folders.flat_map(|folder| {
+        let rows = table(&folder.join("MANIFEST.csv"));
+        assert!(rows.len() >= 3);
+        rows.into_iter().map(move |row| (folder.clone(), row))
+    });
+    for (folder, row) in rows {
         let loaded = surface::read(folder.join(&row["file"])).unwrap();
         let r = &loaded.report;
         let flag = |b: bool| if b { "True" } else { "False" };

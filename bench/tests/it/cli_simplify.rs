@@ -136,6 +136,23 @@ fn max_error_is_met() {
 }
 
 #[test]
+fn errors_and_topology_on_free_meshes() {
+    let at = folder();
+    // The errors are a tenth above those measured.
+    for (name, most, betti) in
+        [("body", 0.011, [1, 0, 0]), ("figure", 0.008, [1, 2, 0]), ("part", 0.116, [1, 8, 0])]
+    {
+        let mesh = medial_test_support::free_meshes().join(format!("{name}.off"));
+        let (mesh, axis) = (text_path(&mesh), &at(&format!("{name}.ma")));
+        json(&["simplify", mesh, "--method", "qmat", "--spheres", "100", "-o", axis]);
+        let (_, object) = json(&["evaluate", mesh, axis]);
+        let hausdorff = object["hausdorff"].as_f64().expect("a number");
+        assert!(hausdorff <= most, "{name}: {hausdorff}");
+        assert_eq!(object["betti"], serde_json::json!(betti), "{name}");
+    }
+}
+
+#[test]
 fn published_counts_and_errors_on_real_meshes() {
     let Some(meshes) = medial_test_support::meshes() else { return };
     for (file, spheres) in [("bear.off", 34_703_i64), ("dolphin.off", 54_241)] {

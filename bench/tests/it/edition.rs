@@ -3,9 +3,10 @@
 use std::fs;
 use std::path::Path;
 
+use medial_bench::provenance::hex_digest;
 use medial_bench::study::edition::{Edition, EditionError};
 use medial_bench::study::source::{Input, Source};
-use medial_reports::editions::{DESCRIPTION, EDITIONS, RECORDS};
+use medial_reports::editions::{DESCRIPTION, EDITIONS, RECORDS, pack, unpack};
 use serde_json::{Value, json};
 
 use crate::command::{done, folder, json, refused, words};
@@ -60,6 +61,59 @@ fn frozen_rows_are_matched_by_content_and_not_run() {
 }
 
 #[test]
+fn rows_of_other_versions_are_marked() {
+    let at = folder();
+    let edition = at("test.1");
+    let study = words("--spheres 20 --samples 500 --counts-only");
+    let compare = |words: &[&str], out: &str| {
+        done(&[&["compare", "builtin:capsule"], words, &study[..], &["--out", &at(out)]].concat())
+    };
+    compare(&["--methods", "qmat,pmat,angle,lambda"], "frozen");
+    done(&["report", &at("frozen"), "--freeze", &edition]);
+    // `qmat` with another error and `angle` are of other versions; `pmat` is of another one with the same result.
+    let [description, packed] = [DESCRIPTION, RECORDS].map(|name| format!("{edition}/{name}"));
+    let bytes = fs::read(&packed).expect("records");
+    let mut records = unpack(&bytes).expect("records").records;
+    for record in &mut records {
+        if record.simplify.method != "lambda" {
+            record.method_version = "0".repeat(64);
+        }
+        if record.simplify.method == "qmat" {
+            record.result_hash = Some("0".repeat(64));
+            record.evaluate.as_mut().expect("measured").distances.hausdorff /= 2.0;
+        }
+    }
+    let altered = pack(&records).expect("packed");
+    let text = fs::read_to_string(&description).expect("a description");
+    fs::write(&description, text.replace(&hex_digest(&bytes), &hex_digest(&altered)))
+        .expect("written");
+    fs::write(&packed, altered).expect("written");
+
+    let stdout = compare(&["--methods", "qmat,pmat", "--against", &edition], "own");
+    let page = fs::read_to_string(at("own/index.html")).expect("a page");
+    let table = fs::read_to_string(at("own/tables/mesh-capsule.md")).expect("a table");
+    let note = "qmat: 1 of 1 results differ from those of edition test.1. Hausdorff error here ÷ there: 2.00";
+    for text in [&stdout, &page, &table] {
+        for (row, is_there) in [
+            ("qmat (test.1, other version)", true),
+            ("angle (test.1, other version)", true),
+            ("lambda (test.1)", true),
+            ("pmat (test.1", false), // one row of equal results
+        ] {
+            assert_eq!(text.contains(row), is_there, "{row}: {text}");
+        }
+        let text = text.replace("\n  ", " ");
+        assert!(text.contains("sources or compiler of the method have changed"), "{text}");
+    }
+    assert!(stdout.contains(note) && page.contains(note), "{stdout}");
+    let own = crate::command::records(at("own"));
+    let file = at("own") + "/" + own[0]["artifact"].as_str().expect("a file");
+    let place = done(&["evaluate", "builtin:capsule", &file, "--against", &edition]);
+    let versions = "this program has other versions of angle, pmat, qmat)";
+    assert!(place.contains(versions), "{place}");
+}
+
+#[test]
 fn editions_that_do_not_compare_are_refused_before_any_run() {
     let at = folder();
     let edition = at("test.1");
@@ -82,7 +136,7 @@ fn editions_that_do_not_compare_are_refused_before_any_run() {
     let text = fs::read_to_string(&description).expect("a description");
     let equal = named("builtin:capsule --samples 500");
     fs::write(&description, text.replace("metrics = ", "metrics = 9")).expect("written");
-    against(&equal, 1, "version 91 of the metrics");
+    against(&equal, 1, "the numbers have other definitions (found version 91, expected");
     fs::write(&description, text.replace("metrics = ", "measures = ")).expect("written");
     against(&equal, 1, "edition.toml: line ");
     fs::write(&description, &text).expect("written");

@@ -225,7 +225,19 @@ fn a_site_has_a_page_for_each_method_mesh_and_external_result() {
     let claims = "title = \"Their <method>\"\nbibtex = \"@misc{them, title = {Theirs}}\"\nmachine = \"a laptop\"\n";
     fs::write(at("theirs/method.toml"), claims).expect("written");
     compared_with(&at("theirs"), &at("report"));
+    let files = || -> Vec<_> {
+        let entries = fs::read_dir(at("report")).expect("a folder").flatten();
+        let written = |entry: &fs::DirEntry| entry.metadata().and_then(|data| data.modified());
+        let mut all: Vec<_> =
+            entries.map(|entry| (entry.file_name(), written(&entry).expect("a time"))).collect();
+        all.sort();
+        all
+    };
+    // The store may be read-only: no lock, no new page.
+    fs::remove_file(at("report/.lock")).expect("removed");
+    let before = files();
     done(&["report", &at("report"), "--site", &at("site")]);
+    assert_eq!(files(), before);
     let pages = [
         "index.html",
         "method-qmat.html",

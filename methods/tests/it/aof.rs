@@ -197,11 +197,14 @@ fn the_topology_is_kept_on_all_shapes() {
     assert_topology_is_kept(&shapes.collect::<Vec<_>>(), &lattices, &[400, 60]);
 }
 
-/// Shared meshes: three holes, and four. The start set has them too, or a warning names the missing ones.
+/// Meshes with two, three and four loops. The start set has them too, or a warning names the missing ones.
 #[test]
-fn homotopy_on_shared_meshes_keeps_their_loops() {
-    for (name, expected) in [("threeholes.off", [1, 3, 0]), ("fertility.off", [1, 4, 0])] {
-        let Some(path) = medial_test_support::mesh(name) else { continue };
+fn homotopy_on_real_meshes_keeps_their_loops() {
+    let shared = [("threeholes.off", [1, 3, 0]), ("fertility.off", [1, 4, 0])];
+    let shared = shared.map(|(name, betti)| (name, medial_test_support::mesh(name), betti));
+    let figure = Some(medial_test_support::free_meshes().join("figure.off"));
+    for (name, path, expected) in shared.into_iter().chain([("figure.off", figure, [1, 2, 0])]) {
+        let Some(path) = path else { continue };
         let shape = shape_of(&surface::read(&path).expect("a surface").mesh);
         for variant in [Variant::Homotopy, Variant::Thinning] {
             for resolution in [20, 48] {

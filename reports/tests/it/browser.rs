@@ -11,7 +11,7 @@ use super::common::{SHAPES, comparison, header};
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::surface::TriMesh;
-use medial_reports::{Record, View3d, picture_strips, write_report};
+use medial_reports::{Record, View3d, picture_strips, write_report, write_site};
 use serde_json::{Value, json};
 
 const BROWSER: &str = "chromium";
@@ -246,4 +246,22 @@ fn the_page_works_from_disk() {
         }
     }
     assert_eq!(requests, 2, "the page and the view that it does not hold");
+}
+
+#[test]
+fn links_that_a_site_draws_resolve() {
+    let [store, site, profile] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+    let Some(mut browser) = Browser::start(profile.path()) else { return };
+    let records = comparison(&SHAPES[..2], &METHODS[..3], &COUNTS);
+    let header = header(&["qmat", "angle", "lambda", "not-run"]);
+    write_site(site.path(), store.path(), &records, &header).unwrap();
+    browser.open(&format!("file://{}/index.html", site.path().display()));
+    browser.value("document.querySelectorAll('details').forEach((fold) => { fold.open = true; fold.fill?.(); }); 0");
+    let links = browser
+        .value("[...document.querySelectorAll('a[href]')].map((a) => a.getAttribute('href'))");
+    let links: Vec<&str> = links.as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    let files = links.iter().filter_map(|link| link.strip_prefix("./"));
+    let missing: Vec<&str> =
+        files.clone().filter(|file| !site.path().join(file).exists()).collect();
+    assert!(missing.is_empty() && files.count() > 10, "{missing:?} of {links:?}");
 }

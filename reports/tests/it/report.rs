@@ -7,6 +7,7 @@ use std::path::Path;
 use super::common::{SHAPES, comparison, documents, failed, header, ok};
 use medial_reports::{
     Header, Record, Running, Status, picture_strips, read_header, summary_text, write_report,
+    write_site,
 };
 
 const METHODS: [&str; 3] = ["qmat", "angle", "lambda"];
@@ -400,7 +401,8 @@ fn an_error_that_rises_with_the_count_is_marked() {
         let marked: Vec<&str> = table.lines().filter(|line| line.contains(" †")).collect();
         assert_eq!(marked.len(), 1, "{name}: {table}");
         assert!(marked[0].starts_with("| 500 |") && marked[0].contains("1.06 †"), "{name}");
-        assert!(table.contains("†: non-monotone"), "{name}");
+        let note = "†: a result with fewer spheres is better. Hausdorff error of qmat: 1.00 % with 100, 1.06 % with 500.";
+        assert!(table.contains(note), "{name}: {table}");
     }
     assert!(text(&files, "tables/summary.tex").contains("$\\dagger$"));
     let [_, bulk] = documents(text(&files, "index.html"));
@@ -472,6 +474,120 @@ fn captions_have_the_recorded_error_and_the_mesh_with_the_largest_spread_leads()
     write_report(folder.path(), &records, &header(&METHODS)).unwrap();
     let [page, _] = documents(&fs::read_to_string(folder.path().join("index.html")).unwrap());
     assert_eq!(page["leading"], 1, "b");
+}
+
+#[test]
+fn a_smaller_and_better_result_is_named_and_pictured() {
+    let pictured = |mut record: Record| {
+        let name = format!("axes/{}-{:?}.ma", record.simplify.method, record.simplify.level);
+        record.artifact = Some(name);
+        record
+    };
+    // For each method the errors at 50 and 100 spheres, and the one whose picture is shown.
+    let cases = [
+        ("qmat", [0.002, 0.009], 50),
+        ("angle", [0.02, 0.01], 100),
+        ("lambda", [0.0101, 0.0103], 100),
+    ];
+    let mut records = vec![];
+    for (method, errors, _) in cases {
+        for (count, error) in [50, 100].into_iter().zip(errors) {
+            records.push(pictured(with_error(ok("bear", method, count, 0, 0), error)));
+        }
+    }
+    let strips = picture_strips(&records);
+    let captions: Vec<&str> = strips[0].panels.iter().map(|(_, caption)| &**caption).collect();
+    let expected =
+        ["qmat (50): Hausdorff 0.200 %", "angle: Hausdorff 1.00 %", "lambda: Hausdorff 1.03 %"];
+    assert_eq!(captions, expected);
+    for ((artifact, _), (method, _, count)) in strips[0].panels.iter().zip(cases) {
+        assert!(artifact.starts_with(&format!("axes/{method}-Spheres({count})")), "{artifact}");
+    }
+    let sentence = " result with fewer spheres is better. Hausdorff error of qmat: 0.200 % with 50, 0.900 % with 100.";
+    let [page, _] = documents(text(&report_of(&records), "index.html"));
+    for place in [&page["meshes"][0]["fewer"], &page["overview"]["notes"]] {
+        assert!(place.to_string().contains(sentence), "{place}");
+    }
+    let printed = summary_text(&records, &[]).replace("\n  ", " ");
+    assert!(printed.contains(sentence), "{printed}");
+    // Without its medial mesh the smaller result has no picture.
+    records[0].artifact = None;
+    assert_eq!(picture_strips(&records)[0].panels[2].1, "lambda: Hausdorff 1.03 %");
+    assert!(
+        picture_strips(&records)[0].panels.iter().any(|panel| panel.1 == "qmat: Hausdorff 0.900 %")
+    );
+    // Many of them are counted.
+    let many: Vec<Record> = SHAPES[..6]
+        .iter()
+        .flat_map(|mesh| {
+            [(50, 0.01), (100, 0.02)].map(|(n, e)| with_error(ok(mesh, "qmat", n, 0, 0), e))
+        })
+        .collect();
+    assert!(summary_text(&many, &[]).replace("\n  ", " ").contains("; and 2 more."));
+}
+
+/// The addresses of a page's elements, without those of other hosts.
+fn local_addresses(html: &str) -> Vec<String> {
+    let elements =
+        html.split(['<', '>']).filter(|part| part.starts_with("a ") || part.starts_with("img "));
+    let addresses =
+        elements.filter_map(|part| part.split_once("href=\"").or(part.split_once("src=\"")));
+    let addresses = addresses.filter_map(|(_, rest)| rest.split('"').next());
+    let files = addresses.map(|address| address.split('#').next().unwrap().to_owned());
+    files.filter(|file| !file.starts_with("https://")).collect()
+}
+
+#[test]
+fn every_link_of_a_site_resolves() {
+    let names = ["a,b", "a_b", "Ö & co", "qmat", "no-note"];
+    let mut records = vec![];
+    for (shape, mesh) in ["bear, large", "bear_ large"].iter().enumerate() {
+        for (rank, name) in names.iter().enumerate() {
+            let mut record = ok(mesh, name, 100, shape, rank);
+            record.artifact = Some(format!("axes/{shape}-{rank}.ma"));
+            records.push(record);
+        }
+        let mut external = ok(mesh, "given", 100, shape, 5);
+        external.status = Status::External;
+        external.simplify.variant = Some("theirs, too".to_owned());
+        records.push(external);
+    }
+    // Of the two others one has no description, and one did not run.
+    let header = header(&[&names[..4], &["theirs, too", "not-run"]].concat());
+    let [store, site] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    write_site(site.path(), store.path(), &records, &header).unwrap();
+    assert_eq!(fs::read_dir(store.path()).unwrap().count(), 0, "the store stays unchanged");
+    let files = files(site.path());
+    let mut links = vec![];
+    for (page, html) in files.iter().filter(|(name, _)| name.ends_with(".html")) {
+        let html = std::str::from_utf8(html).unwrap();
+        links.extend(local_addresses(html).into_iter().map(|link| (page.clone(), link)));
+    }
+    let [page, bulk] = documents(text(&files, "index.html"));
+    for method in [&page["methods"], &page["not_run"]["methods"]]
+        .into_iter()
+        .flat_map(|m| m.as_array().unwrap())
+    {
+        let has_page =
+            names.contains(&method["id"].as_str().unwrap()) || method["id"] == "theirs, too";
+        assert_eq!(method["page"].is_string(), has_page, "{method}");
+        links
+            .extend(method["page"].as_str().map(|link| ("index.html".to_owned(), link.to_owned())));
+    }
+    for mesh in page["meshes"].as_array().unwrap() {
+        let stem = mesh["stem"].as_str().unwrap();
+        let of_mesh = [
+            format!("mesh-{stem}.html"),
+            format!("tables/mesh-{stem}.md"),
+            format!("tables/mesh-{stem}.tex"),
+        ];
+        links.extend(of_mesh.map(|link| ("index.html".to_owned(), link)));
+    }
+    assert!(bulk["columns"].get("table/link").is_none(), "a site has no medial meshes");
+    assert!(links.len() > 40, "{links:?}");
+    for (page, link) in links {
+        assert!(files.contains_key(link.trim_start_matches("./")), "{page}: {link}");
+    }
 }
 
 #[test]
@@ -577,7 +693,11 @@ fn few_meshes_establish_nothing() {
     assert!(differences.contains("no difference can be established"), "{differences}");
     assert!(differences.contains("| qmat | 2.0 | 5 |"), "without an interval: {differences}");
     let purpose = text(&files, "tables/overview-purpose.md");
-    assert!(purpose.contains("no, n = 5 is too few"), "{purpose}");
+    let note = "No difference is established: 5 meshes are too few (the test needs 6).";
+    assert!(purpose.contains(note) && !purpose.contains("| difference established"), "{purpose}");
+    // The smallest count that ran is a bound, and the time of the fastest is in the column of the time.
+    assert!(purpose.contains("| **tight** | at most 100 spheres | "), "{purpose}");
+    assert!(purpose.contains("| fastest within 1 % error | **tight** | – | "), "{purpose}");
 }
 
 #[test]
@@ -610,7 +730,7 @@ fn a_page_of_one_mesh_counts_no_meshes() {
         report
     };
     let [one, two] = [&SHAPES[..1], &SHAPES[..2]].map(report);
-    for (page, columns) in [(&one, 6), (&two, 8)] {
+    for (page, columns) in [(&one, 6), (&two, 7)] {
         assert_eq!(page["answers"]["columns"].as_array().unwrap().len(), columns);
     }
     let sections = |page: &serde_json::Value| {
