@@ -42,7 +42,7 @@ const MOST_JOBS: usize = 1024;
 /// More repetitions than this are rejected as implausible.
 const MOST_REPEATS: usize = 10_000;
 
-/// Fewest surface samples of an evaluation: mean errors of fewer are off by more than a tenth.
+/// Fewest surface samples of an evaluation: mean errors of ten samples are off by more than a tenth.
 pub const LEAST_SAMPLES: usize = 100;
 
 /// More surface samples than this are rejected as implausible.
