@@ -13,7 +13,7 @@ use crate::exit::Failure;
 use crate::progress::Verbosity;
 use crate::study::item::Dual;
 use crate::study::registry::{Entry, Registry};
-use crate::study::{MOST_SAMPLES, MOST_THREADS, Study};
+use crate::study::{LEAST_SAMPLES, MOST_SAMPLES, MOST_THREADS, Study};
 
 /// Options of every verb.
 #[derive(Clone, Debug, Args)]
@@ -109,12 +109,12 @@ impl SubstrateArguments {
 /// How results are measured.
 #[derive(Clone, Debug, Args)]
 pub struct MeasureArguments {
-    /// Measure errors at N surface samples in addition to the vertices, and at N samples of the
+    /// Measure errors at N surface samples, at least 100, in addition to the vertices, and at N samples of the
     /// reconstruction [default: 50000 for one mesh, 10000 in `compare`].
     #[arg(
         long,
         value_name = "N",
-        value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_SAMPLES as u64)
+        value_parser = RangedU64ValueParser::<usize>::new().range(LEAST_SAMPLES as u64..=MOST_SAMPLES as u64)
     )]
     pub samples: Option<usize>,
 }

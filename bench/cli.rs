@@ -1,6 +1,7 @@
 //! The arguments of the command, and the way from a verb to an exit code.
 
 use std::ffi::OsString;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
 use clap::{Command, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -13,6 +14,7 @@ use crate::exec::serve::serve;
 use crate::exit::{Exit, Failure};
 use crate::host::Host;
 use crate::interrupt;
+use crate::measure::answer::panic_message;
 use crate::output::{exit_after_output, print_failure, print_raw};
 use crate::plugin::ScriptLoader;
 use crate::study::registry::Registry;
@@ -117,16 +119,28 @@ fn run_with(
             return Exit::Usage;
         }
     };
-    let registry = registry(methods, loader, &cli.global);
-    // The pool before anything else: rayon starts its own at the first use, and then keeps that.
-    let outcome = set_threads(cli.global.threads)
-        .and(registry)
-        .and_then(|mut registry| run(cli.verb, &cli.global, &mut registry));
+    name_bugs();
+    let Cli { global, verb } = cli;
+    // The state after a panic is not used again.
+    let outcome = catch_unwind(AssertUnwindSafe(|| {
+        let registry = registry(methods, loader, &global);
+        // The pool before anything else: rayon starts its own at the first use, and then keeps that.
+        let ready = set_threads(global.threads).and(registry);
+        ready.and_then(|mut registry| run(verb, &global, &mut registry))
+    }));
+    let outcome = outcome.unwrap_or_else(|panic| Err(Failure::bug(panic_message(panic.as_ref()))));
     let exit = outcome.unwrap_or_else(|failure| {
-        print_failure(&failure, &cli.global);
+        print_failure(&failure, &global);
         failure.code
     });
     exit_after_output(exit)
+}
+
+/// Hides the messages of panics, which become failures of one line, unless a backtrace is requested.
+fn name_bugs() {
+    if std::env::var_os("RUST_BACKTRACE").is_none_or(|value| value == "0") {
+        std::panic::set_hook(Box::new(|_| ()));
+    }
 }
 
 /// The verbs of each group, in the order of the help.

@@ -27,6 +27,8 @@ pub enum Exit {
     Regression = 4,
     /// Nothing was measured.
     NothingMeasured = 5,
+    /// A broken invariant: a bug of this program.
+    Bug = 70,
     /// The user interrupted: what shells give for a program ended from the keyboard.
     Interrupted = 130,
 }
@@ -55,6 +57,12 @@ impl Failure {
     /// The command line is wrong.
     pub fn usage(message: impl ToString) -> Self {
         Self { code: Exit::Usage, message: message.to_string() }
+    }
+
+    /// A broken invariant, with the message of its panic.
+    pub fn bug(message: impl Display) -> Self {
+        let advice = "this is a bug of medial, please report it with the input";
+        Self { code: Exit::Bug, message: format!("{message}; {advice}") }
     }
 
     /// The file or folder at `path` is wrong.
@@ -93,7 +101,7 @@ impl From<RunError> for Failure {
             RunError::Interrupted => Exit::Interrupted,
             // No worker, no result: not the fault of an input.
             RunError::Start(_) => Exit::NothingMeasured,
-            RunError::Store(_) => Exit::Input,
+            RunError::Store(_) | RunError::Foreign { .. } => Exit::Input,
         };
         Self { code, message: error.to_string() }
     }

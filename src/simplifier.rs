@@ -292,10 +292,15 @@ impl RunContext {
         if let Some(progress) = &self.progress {
             progress(Progress { done, total });
         }
-        if self.is_cancelled() {
-            return Err(SimplifyError::Cancelled);
-        }
-        Ok(())
+        self.check()
+    }
+
+    /// Checks for cancellation. Cheap: called at each step of a loop, of which some report no progress.
+    ///
+    /// # Errors
+    /// [`SimplifyError::Cancelled`] once the flag is set.
+    pub fn check(&self) -> Result<(), SimplifyError> {
+        if self.is_cancelled() { Err(SimplifyError::Cancelled) } else { Ok(()) }
     }
 }
 

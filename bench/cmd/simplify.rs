@@ -7,13 +7,12 @@ use medial::complex;
 use medial::complex::MedialMesh;
 use medial::metrics::topology_warning;
 use medial::shape::Shape;
-use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
+use medial::simplifier::{MedialSimplifier, Params, RunContext, Simplified};
 use medial::surface::Sampling;
 use medial_methods::aof;
 use medial_methods::aof::LatticeVoxels;
 use medial_methods::tam_heidrich::PartInfo;
-use medial_reports::{Simplify, Status, file_stem, significant};
-use serde::Serialize;
+use medial_reports::{Simplify, Status, Target, file_stem, significant};
 use serde_json::json;
 
 use crate::args::{
@@ -21,14 +20,12 @@ use crate::args::{
 };
 use crate::exit::{Exit, Failure};
 use crate::files::{check_apart, check_extension, check_folder, check_output, left_out, shape_of};
-use crate::measure::answer::{Bounds, Budget, Fault, LevelRun, answer, preparing};
-use crate::measure::search::Found;
+use crate::measure::answer::{Fault, LevelRun, Searched, Single};
 use crate::measure::{fill_costs, fill_result};
 use crate::output::{counted, print_json, print_line, version};
 use crate::progress::StageLine;
 use crate::study::external::{AxisOptions, percent, read_axis};
 use crate::study::registry::{DEFAULT, Entry, Registry};
-use crate::study::source::Input;
 
 /// Arguments of `simplify`.
 #[derive(Debug, Args)]
@@ -98,7 +95,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         shape = shape.with_initial(&initial);
     }
     let params = params(&arguments.set);
-    let (run, search) = arguments.run(entry, &params, (&shape, &input), &line)?;
+    let (run, search) = arguments.run(entry, &params, &shape, &line);
     let mut simplify = Simplify {
         params,
         seed: arguments.substrate.seed(),
@@ -191,62 +188,40 @@ impl Arguments {
         &self,
         entry: &Entry,
         params: &Params,
-        (shape, input): (&Shape, &Input),
+        shape: &Shape,
         line: &StageLine,
-    ) -> Result<(LevelRun, Option<Searched>), Failure> {
+    ) -> (LevelRun, Option<Searched>) {
         let seed = self.substrate.seed();
-        let context = RunContext::with_seed(seed).on_progress(line.steps());
-        let info = entry.method().info();
-        let prepare = preparing(|view| entry.method().prepare(view, params, &context));
-        let budget = Budget::from_now(None);
-        line.at(format!("preparing {}", info.id));
-        let Some(bound) = self.max_error else {
-            let level = match (self.spheres, self.level) {
-                (Some(count), _) => Level::Spheres(count),
-                (_, Some(value)) => Level::Native(value),
-                _ => Level::Published,
-            };
-            let at = |level| line.at(format!("simplifying to {level} by {}", info.id));
-            let view = shape.view();
-            let run = answer(&view, info, || prepare(&view), &[level], &budget, at).pop();
-            return Ok((run.expect("one level, one run"), None));
+        let id = entry.id();
+        line.at(format!("preparing {id}"));
+        let target = match (self.max_error, self.spheres, self.level) {
+            (Some(bound), ..) => Target::MaxError(bound),
+            (_, Some(count), _) => Target::Spheres(count),
+            (.., Some(value)) => Target::Native(value),
+            _ => Target::Published,
         };
-        let judge = shape.judge(input.axis.as_ref(), self.measure.judge_options(seed));
-        let judge = judge.map_err(|error| self.failure(SimplifyError::from(error).into()))?;
-        let measure = |mesh: &MedialMesh| -> Result<f64, String> {
-            let sampled = judge.distances(mesh).map_err(|error| error.to_string())?.hausdorff;
-            // Samples are a lower bound: above the error bound, no certificate is needed.
-            if !self.certify || sampled > bound {
-                return Ok(sampled);
-            }
-            // An upper end within the bound needs an interval much narrower than the bound.
-            let certified = judge.certify(mesh, CERTIFIED_SHARE * bound);
-            Ok(certified.map_err(|error| error.to_string())?.upper)
+        let at = |level| match self.max_error {
+            Some(_) => line.at(format!("searching the bound: {level}")),
+            None => line.at(format!("simplifying to {level} by {id}")),
         };
-        let search = Bounds {
+        let single = Single {
             shape,
-            info,
+            method: entry.method(),
             sweep: &entry.presentation().sweep,
-            prepare: &prepare,
-            measure: &measure,
-            budget: &budget,
-            searching: &|_| {},
-            trying: &|level| line.at(format!("searching the bound: {level}")),
+            params,
+            context: &RunContext::with_seed(seed).on_progress(line.steps()),
+            judge: self.measure.judge_options(seed),
+            certify: self.certify,
+            on_level: &at,
         };
-        let mut ended = None;
-        search.answer(&[bound], &mut |run, found| {
-            ended = Some((run, found));
-            Ok::<_, Failure>(())
-        })?;
-        let (run, found) = ended.expect("one bound, one run");
-        let Some(Found { within: Some(probe), tried, .. }) = found else { return Ok((run, None)) };
-        let (spheres, hausdorff) = (probe.spheres, probe.error);
-        let searched = Searched { bound, hausdorff, tried, spheres, certified: self.certify };
-        Ok((LevelRun { level: probe.level.into(), ..run }, Some(searched)))
+        single.run(target)
     }
 
-    fn failure(&self, Fault { status, reason }: Fault) -> Failure {
+    fn failure(&self, fault: Fault) -> Failure {
+        let is_bug = fault.is_bug();
+        let Fault { status, reason } = fault;
         match status {
+            _ if is_bug => Failure::bug(format!("{}: {reason}", self.mesh.display())),
             Status::Unsupported => Failure { code: Exit::SomeFailed, message: reason },
             // Another value of an option would be accepted.
             Status::Refused | Status::BoundMissed => Failure::usage(reason),
@@ -281,24 +256,6 @@ fn print_result(simplify: &Simplify, search: Option<&Searched>, arguments: &Argu
     }
     arguments.outputs.written().iter().for_each(|line| print_line(&format!("  {line}")));
 }
-
-/// The result of a search for `--max-error`, for JSON.
-#[derive(Debug, Serialize)]
-struct Searched {
-    /// The bound, a fraction of the diagonal.
-    bound: f64,
-    /// The error of the result.
-    hausdorff: f64,
-    /// Number of levels that were tried.
-    tried: usize,
-    /// Spheres of the result.
-    spheres: usize,
-    /// Whether the error is the upper end of a certified interval, or else a maximum of samples.
-    certified: bool,
-}
-
-/// Width of the interval that certifies a bound, as a share of it.
-const CERTIFIED_SHARE: f64 = 0.05;
 
 /// Reads a bound.
 // The whole solid is within one diagonal of each of its points, so that 1 and more are implausible.

@@ -23,13 +23,13 @@ use std::time::{Duration, Instant};
 use medial_reports::{Record, Repetition, Status, Target};
 
 use crate::check::Outcome;
-use crate::exec::protocol::{CheckItem, Event, Request};
+use crate::exec::protocol::{CheckItem, Event, PROTOCOL, Request};
 use crate::exec::worker::{Worker, WorkerOptions};
 use crate::measure::answer::Fault;
 use crate::measure::failure_record;
 use crate::process_tree::signal_name;
 use crate::provenance::Provenance;
-use crate::store::StoreError;
+use crate::store::{AGAIN, StoreError};
 use crate::study::item::{Item, Limits, SceneSpec};
 
 /// The reason for which a list of items stops.
@@ -41,6 +41,15 @@ pub enum RunError {
     /// A worker cannot be started.
     #[error("worker process: cannot be started ({0})")]
     Start(io::Error),
+    /// The program of another build does not serve as a worker.
+    #[error("{}: not a worker of this build (found {found}, expected protocol {PROTOCOL}); \
+             name a build of medial of the same protocol", program.display())]
+    Foreign {
+        /// The program.
+        program: PathBuf,
+        /// Its first message, or its end.
+        found: String,
+    },
     /// A record cannot be written.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -62,6 +71,8 @@ pub struct Supervisor<'a> {
     /// An input that ended its worker.
     // Its other items are not tried: they would end the next worker at the same place.
     lost: Option<(SceneSpec, Fault)>,
+    /// Commands that run items again whose worker ended.
+    again: Vec<String>,
 }
 
 /// The times of a repetition of a level, and a hash of its result.
@@ -94,6 +105,7 @@ impl<'a> Supervisor<'a> {
             worker: None,
             input: None,
             lost: None,
+            again: Vec::new(),
         }
     }
 
@@ -296,7 +308,7 @@ impl<'a> Supervisor<'a> {
             worker = self.worker_for(request)?;
             worker.send(request).map_err(RunError::Start)?;
         }
-        let mut since = Instant::now();
+        let (mut since, mut looked) = (Instant::now(), Instant::now());
         loop {
             if self.interrupted.load(Ordering::Relaxed) {
                 worker.end();
@@ -305,9 +317,26 @@ impl<'a> Supervisor<'a> {
             // Also between events: a worker that sends events without end must not escape the limit.
             if since.elapsed() > limits.time() {
                 worker.end();
-                return Ok(Attempt::Ended(stage, timed_out(stage, &limits)));
+                return Ok(self.ended(request, stage, timed_out(stage, &limits)));
+            }
+            // The memory limit of the worker does not cover the programs that it started.
+            if looked.elapsed() >= LOOK_AGAIN {
+                looked = Instant::now();
+                if worker.resident_bytes() > limits.bytes {
+                    worker.end();
+                    return Ok(self.ended(request, stage, out_of_memory(stage, &limits)));
+                }
             }
             match worker.listen(LOOK_AGAIN) {
+                Ok(Event::Ready(PROTOCOL)) => worker.is_ready = true,
+                Ok(event) if !worker.is_ready => {
+                    let found = match event {
+                        Event::Ready(other) => format!("protocol {other}"),
+                        _ => "no protocol".to_owned(),
+                    };
+                    worker.end();
+                    return Err(self.foreign(found));
+                }
                 Ok(event) => match event {
                     Event::Finished => {
                         self.worker = Some(worker);
@@ -339,36 +368,75 @@ impl<'a> Supervisor<'a> {
                     }
                 },
                 Err(RecvTimeoutError::Disconnected) => {
+                    let is_foreign = !worker.is_ready && self.program.is_some();
                     let (status, stderr) = worker.collect();
+                    if is_foreign {
+                        let end = status.map_or_else(|| "no end".to_owned(), describe_end);
+                        return Err(self.foreign(end));
+                    }
                     // A refused allocation that the worker survived did not end it.
                     let memory_refused = memory_refused && !status.is_some_and(|s| s.success());
                     let fault = ended(stage, status, &stderr, memory_refused, &limits);
-                    return Ok(Attempt::Ended(stage, fault));
-                }
-                // The memory limit of the worker does not cover the programs that it started.
-                Err(RecvTimeoutError::Timeout) if worker.resident_bytes() > limits.bytes => {
-                    worker.end();
-                    return Ok(Attempt::Ended(stage, out_of_memory(stage, &limits)));
+                    return Ok(self.ended(request, stage, fault));
                 }
                 Err(RecvTimeoutError::Timeout) => {}
             }
         }
     }
 
+    /// The error of a program that does not serve as a worker.
+    fn foreign(&self, found: String) -> RunError {
+        // The running program as its own worker is of this build.
+        let program = self.program.clone().unwrap_or_else(|| PathBuf::from("medial"));
+        RunError::Foreign { program, found }
+    }
+
+    /// The end of a worker. The request stays in a file, with a command that runs it again.
+    fn ended(&mut self, request: &Request, stage: Stage, fault: Fault) -> Attempt {
+        if let (Some(axes), Some(item)) = (&self.axes, request.item()) {
+            let key = item.levels.first().map_or_else(String::new, |&level| item.key(level));
+            let folder = axes.with_file_name(AGAIN);
+            let file = folder.join(format!("{}.json", &key[..key.len().min(12)]));
+            let text = serde_json::to_string(request).expect("plain data") + "\n";
+            let written = std::fs::create_dir_all(&folder).is_ok()
+                && medial::write_atomically(&file, |out| out.write_all(text.as_bytes())).is_ok();
+            // Without the file the record still has the reason.
+            if written {
+                let program = self.program.as_deref().unwrap_or(Path::new("medial"));
+                let mut words = vec![program.display().to_string(), "worker".to_owned()];
+                words.extend(self.options(request).arguments());
+                self.again.push(format!(
+                    "{}, {}: run this item again by `{} < '{}'`",
+                    item.scene.mesh,
+                    item.method.label(),
+                    words.join(" "),
+                    file.display()
+                ));
+            }
+        }
+        Attempt::Ended(stage, fault)
+    }
+
+    /// The commands that run items again whose worker ended, since the last call.
+    pub fn take_again(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.again)
+    }
+
     /// The present worker if it fits the request, else a new one.
     fn worker_for(&mut self, request: &Request) -> Result<Worker, RunError> {
-        let (threads, limits) = request.terms();
         // The size of the pool and the limit of memory cannot be changed in a running process.
-        let options = WorkerOptions {
-            program: self.program.clone(),
-            threads,
-            bytes: limits.bytes,
-            plugins: self.plugins.clone(),
-        };
+        let options = self.options(request);
         match self.worker.take() {
             Some(worker) if worker.options == options => Ok(worker),
             _ => Worker::start(options).map_err(RunError::Start),
         }
+    }
+
+    /// How the worker of a request is started.
+    fn options(&self, request: &Request) -> WorkerOptions {
+        let (threads, limits) = request.terms();
+        let (program, plugins) = (self.program.clone(), self.plugins.clone());
+        WorkerOptions { program, threads, bytes: limits.bytes, plugins }
     }
 }
 

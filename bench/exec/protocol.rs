@@ -21,6 +21,9 @@ const MARK: u8 = 0x1e;
 /// A longer line is not a message.
 const MAX_LINE_BYTES: u64 = 64 << 20;
 
+/// Version of this protocol: one more with each change of [`Request`] or [`Event`] that other builds cannot read.
+pub const PROTOCOL: u32 = 1;
+
 /// A request to a worker.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Request {
@@ -83,6 +86,8 @@ pub struct CheckItem {
 /// A message from a worker.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Event {
+    /// The first event of a worker: its [`PROTOCOL`].
+    Ready(u32),
     /// The input is being read and prepared.
     Loading,
     /// The input is ready, its SHA-256; the method prepares.

@@ -152,7 +152,8 @@ fn run_batch(
                 if turn == 1 {
                     *records = lane[side].run(item)?;
                     let remarks = reasons(records);
-                    remarks.iter().for_each(|remark| lock(desk).progress.remark(remark));
+                    let again = lane[side].take_again();
+                    remarks.iter().chain(&again).for_each(|it| lock(desk).progress.remark(it));
                 } else if records.iter().any(|record| record.status.has_result()) {
                     let again = lane[side].again(item, records)?;
                     merge(records, turn, again);

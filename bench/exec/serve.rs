@@ -19,7 +19,7 @@ use medial::simplifier::{Level, MethodInfo, RunContext, SimplifyError};
 use medial_reports::{Record, Status};
 
 use crate::check::{Outcome, Subject};
-use crate::exec::protocol::{CheckItem, Event, Request, send};
+use crate::exec::protocol::{CheckItem, Event, PROTOCOL, Request, send};
 use crate::measure::answer::{Bounds, Budget, Fault, LevelRun, answer, panic_message, preparing};
 use crate::measure::{Scene, failure_record, judge, mesh_hash, record, repetition};
 use crate::plugin::SCRATCH;
@@ -37,6 +37,8 @@ pub fn serve(registry: &Registry, bytes: u64) -> ExitCode {
     process_tree::become_worker();
     medial::heap::on_refusal(crate::exec::protocol::send_out_of_memory);
     let mut scene = None;
+    // The supervisor notices by itself when the pipe is closed.
+    let _ = send(&Event::Ready(PROTOCOL));
     for request in requests() {
         let served = match request {
             Request::Run { item, axes, provenance } => {
@@ -150,7 +152,7 @@ fn run(
     // A loose bound costs few probes, from which the search for a tighter one starts.
     bounds.sort_by(|a, b| b.total_cmp(a));
     let measure = |mesh: &MedialMesh| {
-        let distances = scene.judge.distances(&scene.carried(mesh));
+        let distances = scene.judge.distances(&scene.judged(mesh));
         distances.map(|distances| distances.hausdorff).map_err(|error| error.to_string())
     };
     let search = Bounds {
@@ -161,7 +163,7 @@ fn run(
         measure: &measure,
         budget: &budget,
         searching: &|bound| drop(send(&Event::Simplifying(bound))),
-        trying: &|_| {},
+        trying: &|_| Ok(()),
     };
     // Each bound is recorded before the next, tighter one: a method that ends its worker at a tight
     // bound loses none of the looser ones.

@@ -30,6 +30,18 @@ pub struct WorkerOptions {
     pub plugins: Vec<PathBuf>,
 }
 
+impl WorkerOptions {
+    /// The words after the verb.
+    pub fn arguments(&self) -> Vec<String> {
+        let (threads, bytes) = (self.threads.to_string(), self.bytes.to_string());
+        let mut words = ["--threads", &threads, "--bytes", &bytes].map(str::to_owned).to_vec();
+        // Study files and arguments have UTF-8 paths.
+        let files = self.plugins.iter().map(|file| file.display().to_string());
+        words.extend(files.flat_map(|file| ["--plugins".to_owned(), file]));
+        words
+    }
+}
+
 /// A running worker.
 pub struct Worker {
     child: Child,
@@ -39,6 +51,8 @@ pub struct Worker {
     stderr: Drain,
     /// Folder for the files of the programs that it starts; removed with the worker at any kind of end.
     _scratch: TempDir,
+    /// Whether it has named the protocol of this build.
+    pub is_ready: bool,
     /// How it was started.
     pub options: WorkerOptions,
 }
@@ -53,11 +67,7 @@ impl Worker {
             Some(program) => host::named(Command::new(program)),
             None => Host::here()?.command(),
         };
-        command.arg("worker").arg("--threads").arg(options.threads.to_string());
-        command.arg("--bytes").arg(options.bytes.to_string());
-        for file in &options.plugins {
-            command.arg("--plugins").arg(file);
-        }
+        command.arg("worker").args(options.arguments());
         // One folder for each worker: when it is killed, the files of its programs go with it.
         let scratch = tempfile::Builder::new().prefix("medial-").tempdir()?;
         command.env(SCRATCH, scratch.path());
@@ -77,7 +87,16 @@ impl Worker {
         });
         let (stderr, tree) = (Drain::start(errors), Tree::of(&child));
         let requests = Some(requests);
-        Ok(Self { child, tree, requests, events, stderr, _scratch: scratch, options })
+        Ok(Self {
+            child,
+            tree,
+            requests,
+            events,
+            stderr,
+            _scratch: scratch,
+            is_ready: false,
+            options,
+        })
     }
 
     /// Sends a request.

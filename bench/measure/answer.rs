@@ -6,16 +6,22 @@
 
 use std::any::Any;
 use std::cell::Cell;
+use std::convert::Infallible;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
+use medial::complex::MedialMesh;
 use medial::heap::Usage;
+use medial::metrics::JudgeOptions;
 use medial::shape::{Cost, Shape, Substrate};
-use medial::simplifier::{Level, MethodInfo, Simplification, Simplified, SimplifyError};
+use medial::simplifier::{
+    Level, MedialSimplifier, MethodInfo, Params, RunContext, Simplification, Simplified,
+    SimplifyError,
+};
 use medial_reports::{Stages, Status, Target};
 use serde::{Deserialize, Serialize};
 
-use crate::measure::search::{Found, Measure, Probe, Search};
+use crate::measure::search::{Found, Measure, Probe, Search, Trying};
 
 /// The outcome of one level.
 pub struct LevelRun {
@@ -295,11 +301,21 @@ pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, SimplifyError>) -> Res
     }
 }
 
+impl Fault {
+    /// Whether the method panicked, unlike a program that a signal ended.
+    pub fn is_bug(&self) -> bool {
+        self.status == Status::Panicked && self.reason.starts_with(PANICKED)
+    }
+}
+
+/// Begin of the message of a panic.
+const PANICKED: &str = "panicked: ";
+
 /// The message of a panic.
 pub(crate) fn panic_message(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
     let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
-    format!("panicked: {}", text.unwrap_or_else(|| "no message".into()))
+    format!("{PANICKED}{}", text.unwrap_or_else(|| "no message".into()))
 }
 
 /// Begins a simplification on a view.
@@ -341,7 +357,7 @@ pub struct Bounds<'a> {
     /// Gets each bound before the search for it.
     pub searching: &'a dyn Fn(Target),
     /// Gets each level before it is tried.
-    pub trying: &'a dyn Fn(Level),
+    pub trying: &'a Trying<'a>,
 }
 
 impl Bounds<'_> {
@@ -356,7 +372,13 @@ impl Bounds<'_> {
         each: &mut dyn FnMut(LevelRun, Option<Found>) -> Result<(), E>,
     ) -> Result<(), E> {
         if self.info.native.as_ref().is_some_and(|native| native.is_error_bound) {
-            return self.answer_directly(bounds, each);
+            return bounds.iter().try_for_each(|&bound| {
+                (self.searching)(Target::MaxError(bound));
+                let ended = self.budget.used_up().map_or_else(|| self.direct(bound), Err);
+                self.budget.has_level.set(true);
+                let (run, found) = ended.unwrap_or_else(|fault| (failed(bound, fault), None));
+                each(run, found)
+            });
         }
         // A separate view: substrates of the search are not those of the timed run.
         let view = self.shape.view();
@@ -379,57 +401,50 @@ impl Bounds<'_> {
         // The loosest bound first: the levels tried for it help the others.
         for &bound in bounds {
             (self.searching)(Target::MaxError(bound));
-            let found = match broken.clone().or_else(|| self.budget.used_up()) {
+            let ended = match broken.clone().or_else(|| self.budget.used_up()) {
                 Some(fault) => Err(fault),
-                None => guarded(|| search.within(bound)),
+                None => self.searched(&mut search, bound),
             };
             self.budget.has_level.set(true);
             // A method that panicked is in an unknown state and must not be called again.
-            broken = found.as_ref().err().filter(|fault| fault.status == Status::Panicked).cloned();
-            match found {
-                Ok(found) => {
-                    let run = match found.within {
-                        Some(probe) => self.timed(probe.level, bound),
-                        None => missed(bound, &found),
-                    };
-                    each(run, Some(found))?;
-                }
-                Err(fault) => each(failed(bound, fault), None)?,
-            }
+            broken = ended.as_ref().err().filter(|fault| fault.status == Status::Panicked).cloned();
+            let (run, found) = ended.unwrap_or_else(|fault| (failed(bound, fault), None));
+            each(run, found)?;
         }
         Ok(())
     }
 
-    /// A run for each bound of a method that holds bounds by itself.
-    fn answer_directly<E>(
+    /// The run of a method that holds bounds by itself.
+    fn direct(&self, bound: f64) -> Result<(LevelRun, Option<Found>), Fault> {
+        let level = Level::Native(bound);
+        (self.trying)(level)?;
+        let run = self.timed(level, bound);
+        let Ok(Simplified { mesh, .. }) = &run.outcome else { return Ok((run, None)) };
+        let error = (self.measure)(mesh).map_err(SimplifyError::Level)?;
+        let probe = Probe { level, spheres: mesh.spheres.len(), error };
+        let within = (error <= bound).then_some(probe);
+        let found = Found { within, best: Some(probe), tried: 1 };
+        Ok((if within.is_some() { run } else { missed(bound, &found) }, Some(found)))
+    }
+
+    /// The run of the fewest spheres within a bound. Each level found runs alone, and another is searched if its
+    /// result misses the bound then.
+    fn searched(
         &self,
-        bounds: &[f64],
-        each: &mut dyn FnMut(LevelRun, Option<Found>) -> Result<(), E>,
-    ) -> Result<(), E> {
-        for &bound in bounds {
-            (self.searching)(Target::MaxError(bound));
-            let run = match self.budget.used_up() {
-                Some(fault) => failed(bound, fault),
-                None => self.timed(Level::Native(bound), bound),
-            };
-            self.budget.has_level.set(true);
-            let Ok(Simplified { mesh, .. }) = &run.outcome else {
-                each(run, None)?;
-                continue;
-            };
-            let (run, found) = match (self.measure)(mesh) {
-                Ok(error) => {
-                    let spheres = mesh.spheres.len();
-                    let probe = Probe { level: Level::Native(bound), spheres, error };
-                    let within = (error <= bound).then_some(probe);
-                    let found = Found { within, best: Some(probe), tried: 1 };
-                    (if within.is_some() { run } else { missed(bound, &found) }, Some(found))
-                }
-                Err(why) => (failed(bound, Fault::from(SimplifyError::Level(why))), None),
-            };
-            each(run, found)?;
+        search: &mut Search<'_>,
+        bound: f64,
+    ) -> Result<(LevelRun, Option<Found>), Fault> {
+        loop {
+            let mut found = guarded(|| search.within(bound))?;
+            let Some(probe) = found.within else { return Ok((missed(bound, &found), Some(found))) };
+            let run = self.timed(probe.level, bound);
+            let Ok(Simplified { mesh, .. }) = &run.outcome else { return Ok((run, Some(found))) };
+            let alone = search.recheck(probe.level, mesh)?;
+            if alone.error <= bound {
+                found.within = Some(alone);
+                return Ok((run, Some(found)));
+            }
         }
-        Ok(())
     }
 
     /// The timed run of the level that a search found.
@@ -440,5 +455,101 @@ impl Bounds<'_> {
         let runs = answer(&view, self.info, || (self.prepare)(&view), &[level], &budget, |_| {});
         let run = runs.into_iter().next().expect("one level, one run");
         LevelRun { level: Target::MaxError(bound), ..run }
+    }
+}
+
+/// A method on a shape: `simplify` of the command and of Python.
+pub struct Single<'a> {
+    /// The shape.
+    pub shape: &'a Shape,
+    /// The method.
+    pub method: &'a dyn MedialSimplifier,
+    /// Native levels of its default comparison.
+    pub sweep: &'a [f64],
+    /// Its parameters.
+    pub params: &'a Params,
+    /// Seed, progress and cancellation.
+    pub context: &'a RunContext,
+    /// Measures results for an error bound.
+    pub judge: JudgeOptions,
+    /// Whether a certificate proves the error bound instead of samples.
+    pub certify: bool,
+    /// Gets each level before it is computed.
+    pub on_level: &'a dyn Fn(Level),
+}
+
+/// The result of a search for an error bound.
+#[derive(Clone, Debug, Serialize)]
+pub struct Searched {
+    /// The bound, a fraction of the diagonal.
+    pub bound: f64,
+    /// The error of the result.
+    pub hausdorff: f64,
+    /// Number of levels that were tried.
+    pub tried: usize,
+    /// Spheres of the result.
+    pub spheres: usize,
+    /// Whether the error is the upper end of a certified interval, or else a maximum of samples.
+    pub certified: bool,
+}
+
+/// Width of the interval that certifies a bound, as a share of it.
+const CERTIFIED_SHARE: f64 = 0.05;
+
+impl Single<'_> {
+    /// The run at a level, or at the level that a search for an error bound finds.
+    pub fn run(&self, target: Target) -> (LevelRun, Option<Searched>) {
+        let Self { shape, method, params, context, .. } = *self;
+        let (info, budget) = (method.info(), Budget::from_now(None));
+        let prepare = preparing(|view| method.prepare(view, params, context));
+        let bound = match target.level() {
+            Ok(level) => {
+                let view = shape.view();
+                let runs = answer(&view, info, || prepare(&view), &[level], &budget, self.on_level);
+                return (runs.into_iter().next().expect("one level, one run"), None);
+            }
+            Err(bound) => bound,
+        };
+        // The known axis does not count for the error.
+        let judge = match shape.judge(None, self.judge) {
+            Ok(judge) => judge,
+            Err(error) => return (failed(bound, SimplifyError::from(error).into()), None),
+        };
+        let measure = |mesh: &MedialMesh| -> Result<f64, String> {
+            let sampled = judge.distances(mesh).map_err(|error| error.to_string())?.hausdorff;
+            // Samples are a lower bound: above the error bound, no certificate is needed.
+            if !self.certify || sampled > bound {
+                return Ok(sampled);
+            }
+            // An upper end within the bound needs an interval much narrower than the bound.
+            let certified = judge.certify(mesh, CERTIFIED_SHARE * bound);
+            Ok(certified.map_err(|error| error.to_string())?.upper)
+        };
+        let search = Bounds {
+            shape,
+            info,
+            sweep: self.sweep,
+            prepare: &prepare,
+            measure: &measure,
+            budget: &budget,
+            searching: &|_| {},
+            trying: &|level| {
+                if context.is_cancelled() {
+                    return Err(SimplifyError::Cancelled);
+                }
+                (self.on_level)(level);
+                Ok(())
+            },
+        };
+        let mut ended = None;
+        let Ok(()) = search.answer(&[bound], &mut |run, found| {
+            ended = Some((run, found));
+            Ok::<_, Infallible>(())
+        });
+        let (run, found) = ended.expect("one bound, one run");
+        let Some(Found { within: Some(probe), tried, .. }) = found else { return (run, None) };
+        let (spheres, hausdorff) = (probe.spheres, probe.error);
+        let searched = Searched { bound, hausdorff, tried, spheres, certified: self.certify };
+        (LevelRun { level: probe.level.into(), ..run }, Some(searched))
     }
 }

@@ -14,13 +14,17 @@
 //!    intervals of smaller counts whose ends are not far above the bound. For a method without counts it
 //!    bisects native levels.
 //!
-//! The level found is within the bound. A coarser one between two counts that were tried can be missed.
+//! A level that is found can have another result when it runs alone: a finer level came before it in the search. The
+//! error that counts is that of the recorded result ([`Search::recheck`]), so no error stands for another mesh.
+//! A coarser level between two counts that were tried can be missed.
 
 use std::collections::BTreeMap;
 
 use medial::complex::MedialMesh;
 use medial::simplifier::{Level, Simplification, SimplifyError};
 use medial_reports::significant;
+
+use crate::measure::mesh_hash;
 
 /// Counts of the sweep for a method that computes them in one run, and for others.
 const COUNTS: [usize; 2] = [40, 24];
@@ -39,6 +43,9 @@ const BISECTIONS: usize = 7;
 
 /// Measures a medial mesh: its error as a fraction of the diagonal.
 pub type Measure<'a> = dyn Fn(&MedialMesh) -> Result<f64, String> + 'a;
+
+/// Gets each level before it is tried; an error ends the search.
+pub type Trying<'a> = dyn Fn(Level) -> Result<(), SimplifyError> + 'a;
 
 /// A level that was tried.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,8 +75,10 @@ pub struct Search<'a> {
     /// Whether coarser levels continue from finer ones.
     is_incremental: bool,
     measure: &'a Measure<'a>,
-    trying: &'a dyn Fn(Level),
+    trying: &'a Trying<'a>,
     probes: Vec<Probe>,
+    /// Errors by the hash of the mesh. A method that stops above a count gives one mesh for all smaller ones.
+    errors: BTreeMap<String, f64>,
     /// Results that were computed on the way to coarser ones and not yet measured.
     waiting: BTreeMap<usize, MedialMesh>,
     tried: usize,
@@ -88,7 +97,7 @@ impl<'a> Search<'a> {
         sweep: &[f64],
         most: usize,
         measure: &'a Measure<'a>,
-        trying: &'a dyn Fn(Level),
+        trying: &'a Trying<'a>,
     ) -> Self {
         let steps = COUNTS[usize::from(!is_incremental)] - 1;
         let ratio = (most as f64 / FEW as f64).max(1.0).powf(1.0 / steps as f64);
@@ -103,6 +112,7 @@ impl<'a> Search<'a> {
             measure,
             trying,
             probes: Vec::new(),
+            errors: BTreeMap::new(),
             waiting: BTreeMap::new(),
             tried: 0,
             refusal: None,
@@ -189,6 +199,10 @@ impl<'a> Search<'a> {
 
     /// Tries a level. If the method does not have it or has no result there, it is skipped.
     fn probe(&mut self, level: Level) -> Result<(), SimplifyError> {
+        // The error of a level that was rechecked stays.
+        if self.probes.iter().any(|probe| probe.level == level) {
+            return Ok(());
+        }
         if let Some(mesh) = self.compute(level)? {
             self.measure(level, &mesh);
         }
@@ -196,7 +210,7 @@ impl<'a> Search<'a> {
     }
 
     fn compute(&mut self, level: Level) -> Result<Option<MedialMesh>, SimplifyError> {
-        (self.trying)(level);
+        (self.trying)(level)?;
         self.tried += 1;
         match self.simplification.at(level) {
             Ok(simplified) if simplified.mesh.spheres.is_empty() => {
@@ -214,18 +228,31 @@ impl<'a> Search<'a> {
     }
 
     fn measure(&mut self, level: Level, mesh: &MedialMesh) {
-        let spheres = mesh.spheres.len();
-        // A method that stops above a count gives one mesh for all smaller ones.
-        let known = self.probes.iter().find(|probe| probe.spheres == spheres).copied();
-        let requested = matches!(level, Level::Spheres(count) if count == spheres);
-        let error = match known.filter(|_| !requested) {
-            Some(known) => Ok(known.error),
-            None => (self.measure)(mesh),
-        };
-        match error {
-            Ok(error) => self.probes.push(Probe { level, spheres, error }),
-            Err(why) => self.refusal = Some(SimplifyError::Level(why)),
+        match self.error(mesh) {
+            Ok(error) => self.probes.push(Probe { level, spheres: mesh.spheres.len(), error }),
+            Err(why) => self.refusal = Some(why),
         }
+    }
+
+    /// The error of a mesh. Equal meshes are measured once.
+    fn error(&mut self, mesh: &MedialMesh) -> Result<f64, SimplifyError> {
+        let hash = mesh_hash(mesh);
+        if let Some(&error) = self.errors.get(&hash) {
+            return Ok(error);
+        }
+        let error = (self.measure)(mesh).map_err(SimplifyError::Level)?;
+        self.errors.insert(hash, error);
+        Ok(error)
+    }
+
+    /// Replaces the result of a level by that of its own run, and returns it.
+    ///
+    /// # Errors
+    /// When the mesh cannot be measured.
+    pub fn recheck(&mut self, level: Level, mesh: &MedialMesh) -> Result<Probe, SimplifyError> {
+        let probe = Probe { level, spheres: mesh.spheres.len(), error: self.error(mesh)? };
+        self.probes.iter_mut().filter(|p| p.level == level).for_each(|p| *p = probe);
+        Ok(probe)
     }
 
     fn fewest(&self, bound: f64) -> Option<Probe> {
@@ -330,8 +357,34 @@ mod tests {
         };
         let measure = |mesh: &MedialMesh| Ok(error(mesh.spheres.len()));
         let sweep = [1.0, 2.0, 4.0, 8.0];
-        let mut search = Search::new(&mut method, is_incremental, &sweep, most, &measure, &|_| {});
+        let mut search =
+            Search::new(&mut method, is_incremental, &sweep, most, &measure, &|_| Ok(()));
         search.within(bound).expect("some level has a result")
+    }
+
+    #[test]
+    fn meshes_with_the_same_number_of_spheres_are_measured_each() {
+        // Every level has three spheres, at places of its own.
+        let mut method = |level: Level| {
+            let Level::Spheres(count) = level else { return Err(SimplifyError::unsupported("no")) };
+            let sphere = |i: usize| Sphere { centre: Vec3::X * (count + i) as f64, radius: 1.0 };
+            let spheres = (0..3).map(sphere).collect();
+            Ok(Simplified::new(MedialMesh { spheres, ..MedialMesh::default() }, level))
+        };
+        let measure = |mesh: &MedialMesh| Ok(mesh.spheres[0].centre.x / 100.0);
+        let mut search = Search::new(&mut method, false, &[], 100, &measure, &|_| Ok(()));
+        let found = search.within(0.3).expect("some level has a result");
+        let Probe { level: Level::Spheres(count), error, .. } = found.within.expect("met") else {
+            panic!("{found:?}");
+        };
+        assert_eq!(error, count as f64 / 100.0);
+        // The result of a run alone takes the place of the level's, so another level is searched.
+        let spheres = vec![Sphere { centre: Vec3::X * 90.0, radius: 1.0 }];
+        let other = MedialMesh { spheres, ..MedialMesh::default() };
+        let alone = search.recheck(Level::Spheres(count), &other).expect("measured");
+        assert_eq!((alone.spheres, alone.error), (1, 0.9));
+        let next = search.within(0.3).expect("some level has a result").within;
+        assert_ne!(next.expect("met").level, Level::Spheres(count));
     }
 
     fn counts(level: Level) -> Option<usize> {

@@ -45,6 +45,9 @@ const MOST_JOBS: usize = 1024;
 /// More repetitions than this are rejected as implausible.
 const MOST_REPEATS: usize = 10_000;
 
+/// Fewest surface samples of an evaluation: mean errors of ten samples are off by more than a tenth.
+pub const LEAST_SAMPLES: usize = 100;
+
 /// More surface samples than this are rejected as implausible.
 pub const MOST_SAMPLES: usize = 10_000_000;
 
@@ -286,8 +289,9 @@ impl Study {
             .chain(&self.against);
         let fault = if !(1..=MOST_REPEATS).contains(&self.repeat) {
             format!("--repeat {}: expected a number from 1 to {MOST_REPEATS}", self.repeat)
-        } else if !(1..=MOST_SAMPLES).contains(&self.samples) {
-            format!("--samples {}: expected a number from 1 to {MOST_SAMPLES}", self.samples)
+        } else if !(LEAST_SAMPLES..=MOST_SAMPLES).contains(&self.samples) {
+            let samples = self.samples;
+            format!("--samples {samples}: expected a number from {LEAST_SAMPLES} to {MOST_SAMPLES}")
         } else if !(self.timeout > 0.0 && self.timeout.is_finite()) {
             format!("--timeout {}: expected a positive number of seconds", self.timeout)
         } else if let Some(threads) = self.threads.filter(|n| !(1..=MOST_THREADS).contains(n)) {
@@ -397,6 +401,16 @@ impl Study {
             // The same row twice would be one row with twice the weight.
             if found.iter().any(|(other, _)| other == method) {
                 continue;
+            }
+            // Results of a variant under the name of a method would pass for those of that method.
+            if let Some(name) = &method.name
+                && registry.entry(name).is_some()
+            {
+                let id = &method.id;
+                return Err(StudyError::Value(format!(
+                    "methods: the name `{name}` is the id of a method (found as the name of a variant of `{id}`); \
+                     choose another name"
+                )));
             }
             if let Some(name) = &method.name
                 && found.iter().any(|(other, _)| other.name.as_ref() == Some(name))

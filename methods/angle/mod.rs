@@ -323,6 +323,7 @@ fn peel(shape: &Shape, scale: Scale, run: &RunContext) -> Result<Peeled> {
     let mut open: BTreeSet<u32> = (0..order.len() as u32).collect();
     let mut effective = 0.0_f64;
     while let Some(first) = open.pop_first() {
+        run.check()?;
         let sheet = order[first as usize];
         if removed.len().is_multiple_of(4096) {
             run.step(removed.len(), sheets.len())?;

@@ -135,6 +135,7 @@ impl Contraction {
         let total = self.complex.sphere_count().saturating_sub(target);
         let first = self.complex.record().len();
         while self.complex.sphere_count() > target {
+            run.check()?;
             let Some(next) = self.cheapest(bound) else { break };
             let Taken { error, ends, survivor } = next;
             self.collapse(ends, survivor);

@@ -248,6 +248,7 @@ fn contract(mesh: &MedialMesh, run: &RunContext) -> Result<Vec<Step>> {
     while let Some(cheapest) =
         queue.pop(|edge| edge.ends.iter().all(|&v| left.has(v)).then_some(edge))
     {
+        run.check()?;
         // Both ends are left, so their spheres, and with them the cost, are those of the queued edge.
         let [removed, kept] = absorbed_first(cheapest.ends, |v| graph.sphere(v).radius);
         let survivor = graph.sphere(kept);

@@ -175,8 +175,10 @@ impl Contraction {
         let total = self.complex.sphere_count().saturating_sub(target);
         let first = self.tally.collapses;
         while self.complex.sphere_count() > target {
+            run.check()?;
             let Some(cheapest) = self.queue.pop(&self.complex) else {
-                let Some(Cluster { first, others, sphere }) = self.unlock(initial) else { break };
+                let cluster = self.unlock(initial, run)?;
+                let Some(Cluster { first, others, sphere }) = cluster else { break };
                 self.tally.unlocked += others.len();
                 others.iter().fold(first, |kept, &v| self.merge([kept, v], sphere));
                 continue;
@@ -430,11 +432,18 @@ pub(super) struct Cluster {
 impl Contraction {
     /// The cheapest edge whose collapse violates the link condition but not the topology of
     /// `initial`, else the first such cluster of coincident spheres. `None` when there is neither.
-    pub(super) fn unlock(&mut self, initial: &MedialMesh) -> Option<Cluster> {
+    ///
+    /// # Errors
+    /// When the run is cancelled: there are as many Betti numbers to compute as edges.
+    pub(super) fn unlock(
+        &mut self,
+        initial: &MedialMesh,
+        run: &RunContext,
+    ) -> Result<Option<Cluster>> {
         // A cluster may hold several kept spheres.
         let is_tied = !self.kept.0.is_empty() || !self.keeps_topology();
         if is_tied || self.complex.sphere_count() > MAX_UNLOCKED_SPHERES {
-            return None;
+            return Ok(None);
         }
         // Computed on demand: few runs get here.
         let goal = betti(initial);
@@ -454,7 +463,13 @@ impl Contraction {
             let sphere = self.placement_without_topology(candidate)?;
             Some(Cluster { first, others: vec![other], sphere })
         });
-        edges.chain(self.coincident_clusters()).find(keeps)
+        for cluster in edges.chain(self.coincident_clusters()) {
+            run.check()?;
+            if keeps(&cluster) {
+                return Ok(Some(cluster));
+            }
+        }
+        Ok(None)
     }
 
     /// The connected sets of three and more spheres whose centres are one point, in the order of

@@ -195,7 +195,7 @@ impl PreparedTight {
             }
             descent = swapped_often(descent, &mut witnesses, run)?;
         }
-        let polish = Polish { goal, params, run, swaps: !is_polish };
+        let polish = Polish { goal, params, run, swaps: !is_polish, bound: None };
         let state = polish.run(descent, witnesses, diagnostics)?;
         Ok(state.mesh)
     }
@@ -317,13 +317,22 @@ impl TightParams {
 const WATCHED: f64 = 1.9;
 
 /// With an error this many times below that, it takes large passes.
-const FAR: f64 = 3.0;
+const SMALL: f64 = 1.5;
+
+/// A state whose error is this many times above the range [`NEAR`] before any round is given up.
+const FAR: f64 = 6.0;
 
 /// From a count within the bound, the next one is smaller by this power of the error. From a count that misses it, the next
 /// one is larger by the power `MORE`, within the limits `GROWTH`. That is generous, because each miss costs a trial.
 const RATE: f64 = 0.9;
 const MORE: f64 = 1.3;
 const GROWTH: [f64; 2] = [1.15, 1.6];
+
+/// The next smaller count is at least this share of one within the bound.
+const LEAST_SHARE: f64 = 0.35;
+
+/// An error outside this range, in bounds, is far from the bound: swaps and rounds change it by less.
+const NEAR: [f64; 2] = [0.5, WATCHED];
 
 /// Between a count that holds the bound and one that does not, this share of the error is aimed at.
 const CLOSE: f64 = 0.97;
@@ -371,31 +380,48 @@ impl Within<'_> {
         let mut least = f64::INFINITY;
         // The state, and the count and measured error of it and of the largest count that missed the bound.
         let (mut within, mut held, mut missed) = (None, None, None::<(usize, f64)>);
-        let mut misses = 0;
-        for trial in 1.. {
-            let mut state = self.with(&meshes, wanted)?;
+        let (mut trials, mut misses) = (0, 0);
+        // The mesh of fewest spheres far within the bound: the next trials continue from it. After a miss they start
+        // from the descent again, because a mesh without rounds can miss a bound that another one of its size meets.
+        let mut smallest: Option<MedialMesh> = None;
+        loop {
+            let mut state = self.with(&meshes, smallest.as_ref(), wanted)?;
             let now = (state.mesh.spheres.len(), state.error);
+            // Trials far from the bound end early and cost little.
+            trials += usize::from(!is_far(bound, now.1));
             if state.error <= bound {
                 state.error = self.goal.certified(&state.mesh, WIDTH * bound)?;
             }
             least = least.min(state.error);
             if state.error <= bound {
                 if held.is_none_or(|(spheres, _)| now.0 < spheres) {
+                    if missed.is_none() && is_far(bound, now.1) {
+                        smallest = Some(state.mesh.clone());
+                    }
                     (within, held) = (Some(state), Some(now));
                 }
                 misses = 0;
             } else if missed.is_none_or(|(spheres, _)| spheres < now.0) {
                 missed = Some((now.0, now.1.max(state.error)));
+                smallest = None;
                 misses += 1;
             }
             wanted = match (held, missed) {
-                // Errors that fall in a step, as of flat solids, mislead an interpolation.
-                (Some((many, _)), Some((few, _))) if misses > 1 => {
-                    ((few * many) as f64).sqrt().round() as usize
+                (Some((many, _)), Some((few, _))) if many <= few + 1 => break,
+                (Some(held), Some(missed)) => {
+                    let (many, few) = (held.0, missed.0);
+                    // Errors that fall in a step, as of flat solids, mislead an interpolation.
+                    let is_step = misses > 1 || is_far(aim, held.1) || is_far(aim, missed.1);
+                    let wanted = if is_step {
+                        ((few * many) as f64).sqrt().round() as usize
+                    } else {
+                        between(held, missed, CLOSE * aim)
+                    };
+                    wanted.clamp(few + 1, many - 1)
                 }
-                (Some(held), Some(missed)) => between(held, missed, CLOSE * aim),
                 (Some((spheres, error)), None) => {
-                    (spheres as f64 * (error / aim).powf(RATE)) as usize
+                    let share = (error / aim).powf(RATE).max(LEAST_SHARE);
+                    (spheres as f64 * share) as usize
                 }
                 (None, Some((spheres, _))) if spheres >= finest => break,
                 (None, Some((spheres, error))) => {
@@ -407,7 +433,9 @@ impl Within<'_> {
             let is_enough = |(spheres, _)| {
                 let spheres = spheres as f64;
                 let is_far = missed.is_none_or(|(missed, _)| spheres > APART * missed as f64);
-                wanted as f64 > ALIKE * spheres || trial >= TRIALS[usize::from(is_far)]
+                wanted == 0
+                    || wanted as f64 > ALIKE * spheres
+                    || trials >= TRIALS[usize::from(is_far)]
             };
             if held.is_some_and(is_enough) {
                 break;
@@ -421,7 +449,7 @@ impl Within<'_> {
         })
     }
 
-    /// The meshes of a descent until the largest error at samples is above a limit, with these errors.
+    /// The meshes of a descent until the largest error at samples rises above a limit, with these errors.
     fn descended(
         &self,
         limit: f64,
@@ -429,42 +457,62 @@ impl Within<'_> {
     ) -> Result<Vec<(MedialMesh, f64)>> {
         let Self { start, goal, run, .. } = *self;
         let mut wanted = self.params.start.max(MANY);
-        let mut descent = loop {
-            // Rounded up: a start of fewer spheres than wanted is all that there is.
-            let mesh = start.mesh(wanted.div_ceil(MANY), run, diagnostics)?;
+        loop {
+            let mesh = start.simplified(wanted, wanted, run, diagnostics)?;
             let spheres = mesh.spheres.len();
             bounded(spheres)?;
             let mut descent = Descent::new(goal, goal.points(MOST), mesh)?;
             descent.run(Objective::power(POWER, descent.largest()), STEPS[1], run)?;
-            // The finest start has to do.
-            if descent.largest() < limit || spheres < wanted || wanted >= MOST {
-                break descent;
+            let mut meshes = vec![(descent.mesh.clone(), descent.largest())];
+            // The start of a flat solid can be worse than its coarser meshes.
+            let mut is_below = descent.largest() < limit;
+            let goes_on =
+                |largest: f64, is_below: bool| largest < if is_below { limit } else { FAR * limit };
+            while goes_on(descent.largest(), is_below) && descent.mesh.spheres.len() > 1 {
+                let near = usize::from(SMALL * descent.largest() > limit);
+                let target = (descent.mesh.spheres.len() as f64 * LEFT[near]) as usize;
+                let Some(smaller) = passed(&descent, target.max(1), near, run)? else { break };
+                descent = smaller;
+                is_below |= descent.largest() < limit;
+                meshes.push((descent.mesh.clone(), descent.largest()));
+            }
+            // A start of fewer spheres than wanted is all that there is, and the finest start has to do.
+            if is_below || spheres < wanted || wanted >= MOST {
+                return Ok(meshes);
             }
             wanted = (2 * wanted).min(MOST);
-        };
-        let mut meshes = vec![(descent.mesh.clone(), descent.largest())];
-        while descent.largest() < limit && descent.mesh.spheres.len() > 1 {
-            let near = usize::from(FAR * descent.largest() > limit);
-            let target = (descent.mesh.spheres.len() as f64 * LEFT[near]) as usize;
-            let Some(smaller) = passed(&descent, target.max(1), near, run)? else { break };
-            descent = smaller;
-            meshes.push((descent.mesh.clone(), descent.largest()));
         }
-        Ok(meshes)
     }
 
-    /// The state of a number of spheres, from the last mesh that has as many.
-    fn with(&self, meshes: &[(MedialMesh, f64)], count: usize) -> Result<State> {
+    /// The state of a number of spheres: from `smallest` if that has as many, or the last mesh with [`MANY`] times as
+    /// many. Without rounds where the error is far from the bound.
+    fn with(
+        &self,
+        meshes: &[(MedialMesh, f64)],
+        smallest: Option<&MedialMesh>,
+        count: usize,
+    ) -> Result<State> {
         let Self { goal, params, run, .. } = *self;
-        let enough = meshes.iter().rev().find(|(mesh, _)| mesh.spheres.len() >= count);
-        let (mesh, _) = enough.unwrap_or(&meshes[0]);
+        // The last passes are careful and with witnesses, as those to a given number of spheres.
+        let enough = meshes.iter().rev().find(|(mesh, _)| mesh.spheres.len() >= MANY * count);
+        let smallest = smallest.filter(|mesh| mesh.spheres.len() >= count);
+        let mesh = smallest.unwrap_or(&enough.unwrap_or(&meshes[0]).0);
         let descent = Descent::new(goal, goal.points(count), mesh.clone())?;
         let mut witnesses = Witnesses::new(goal)?;
-        let descent = reduced(descent, count, &mut witnesses, run)?;
+        let mut descent = reduced(descent, count, &mut witnesses, run)?;
+        let error = witnesses.measure(&mut descent, f64::INFINITY)?;
+        if error < NEAR[0] * self.bound || error > FAR * NEAR[1] * self.bound {
+            return Ok(State { mesh: descent.mesh, error });
+        }
         let descent = swapped_often(descent, &mut witnesses, run)?;
-        let polish = Polish { goal, params, run, swaps: true };
+        let polish = Polish { goal, params, run, swaps: true, bound: Some(self.bound) };
         polish.run(descent, witnesses, &mut Diagnostics::default())
     }
+}
+
+/// Whether an error is far from a bound.
+fn is_far(bound: f64, error: f64) -> bool {
+    !(NEAR[0] * bound..=NEAR[1] * bound).contains(&error)
 }
 
 /// The number of spheres between two at which an error is to be expected: between them the error is a power of it.

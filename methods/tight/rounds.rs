@@ -19,13 +19,13 @@ use medial::complex::{MedialMesh, NearestPrimitive};
 use medial::metrics::PeakSearch;
 use medial::simplifier::{Diagnostics, RunContext};
 
-use super::TightParams;
 use super::collapse::{Guard, Part, Still, clamp};
 use super::goal::{
     self, ASIDE, DEEP, Edited, Goal, Held, Interior, Points, Residuals, Row, Sample, held_from,
     nearest_after, nearest_balls, places, refused, residuals, uncovered, union_of, vertices,
 };
 use super::start::swapped;
+use super::{TightParams, is_far};
 use crate::Result;
 
 /// Powers and steps before the first round.
@@ -86,6 +86,8 @@ pub(super) struct Polish<'a> {
     pub run: &'a RunContext,
     /// Whether connectivity may change.
     pub swaps: bool,
+    /// The error bound, if there is one: far from it no swaps follow.
+    pub bound: Option<f64>,
 }
 
 /// A mesh with its measured error.
@@ -111,7 +113,7 @@ impl<'a> Polish<'a> {
         }
         let error = witnesses.measure(&mut descent, f64::INFINITY)?;
         let (mut best, points) = self.rounds(descent, error, &mut witnesses)?;
-        if self.swaps {
+        if self.swaps && !self.bound.is_some_and(|bound| is_far(bound, best.error)) {
             let from = self.at(&best, points)?;
             let (from, helped) = self.swapped(from, &mut best, &mut witnesses)?;
             diagnostics.count("swaps_that_helped", helped);

@@ -82,12 +82,25 @@ impl Start {
         run: &RunContext,
         diagnostics: &mut Diagnostics,
     ) -> Result<MedialMesh> {
-        let initial = self.shape.initial()?;
         let [few, many] = [MANY, ENOUGH].map(|times| times.saturating_mul(count));
         let wanted = self.least.max(few).max(many.min(MOST_NEEDED));
-        let mesh = if initial.spheres.len()
-            <= if self.shape.has_given_initial() { count } else { wanted }
-        {
+        let enough = if self.shape.has_given_initial() { count } else { wanted };
+        self.simplified(wanted, enough, run, diagnostics)
+    }
+
+    /// A start of `wanted` spheres, or the initial medial mesh if it has at most `enough`.
+    ///
+    /// # Errors
+    /// Those of the other method.
+    pub fn simplified(
+        &self,
+        wanted: usize,
+        enough: usize,
+        run: &RunContext,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<MedialMesh> {
+        let initial = self.shape.initial()?;
+        let mesh = if initial.spheres.len() <= enough {
             MedialMesh::clone(&initial)
         } else {
             let mut levels = self.starter.prepare(&self.shape, &Params::none(), run)?;

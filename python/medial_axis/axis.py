@@ -330,7 +330,7 @@ class MedialAxis:
         Args:
             mesh: The surface; by default that of the medial mesh.
             certify: Certify the Hausdorff error by an interval of this width, a fraction of the bounding-box diagonal.
-            samples: Surface samples in addition to the vertices; as many on the union.
+            samples: Surface samples in addition to the vertices, at least 100; as many on the union.
             seed: Seed of the samples.
             threads: Threads of a separate pool; by default all calls share one.
             progress: Called with a stage and its completed share.
@@ -353,7 +353,7 @@ class MedialAxis:
         mesh._solid()
         text = self._axis.evaluate(
             mesh._surface,
-            whole(samples, "samples", 1, 2**31),
+            whole(samples, "samples", 100, 2**31),
             None if certify is None else real(certify, "certify", 1e-6, 1.0),
             call(seed, threads, progress),
         )

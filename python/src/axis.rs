@@ -10,11 +10,10 @@ use medial::complex::{
 use medial::geometry::Sphere;
 use medial::metrics::JudgeOptions;
 use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{Level, Params, RunContext, Simplified};
+use medial::simplifier::{Params, RunContext, Simplified};
 use medial::surface::{self, Loaded, Normalisation, SurfaceReport, TriMesh};
 use medial_bench::cmd::reconstruct::fitting_surface;
-use medial_bench::measure::answer::{Budget, answer};
-use medial_bench::measure::search::{Found, Probe, Search};
+use medial_bench::measure::answer::Single;
 use medial_bench::measure::{count_fault, fill_costs, fill_result};
 use medial_reports::{Simplify, Target};
 use numpy::{PyArray1, PyReadonlyArray2};
@@ -345,26 +344,20 @@ impl Run {
         context: &RunContext,
         monitor: &Monitor,
     ) -> Result<(Simplified, Value), Failure> {
-        let (level, search) = match target.level() {
-            Ok(level) => (level, None),
-            Err(bound) => {
-                monitor.at("searching the bound");
-                let (level, search) = self.search(bound, context)?;
-                (level, Some(search))
-            }
-        };
-        monitor.at("simplifying");
-        let view = self.start.view();
         let method = self.method.get();
-        let mut runs = answer(
-            &view,
-            method.info(),
-            || method.prepare(&view, &self.params, context),
-            &[level],
-            &Budget::from_now(None),
-            |_| {},
-        );
-        let run = runs.pop().expect("one level, one run");
+        let is_search = target.level().is_err();
+        monitor.at(if is_search { "searching the bound" } else { "simplifying" });
+        let single = Single {
+            shape: &self.start,
+            method,
+            sweep: self.method.sweep(),
+            params: &self.params,
+            context,
+            judge: JudgeOptions { seed: context.seed, ..JudgeOptions::default() },
+            certify: false,
+            on_level: &|_| {},
+        };
+        let (run, search) = single.run(target);
         let simplified = run.outcome.map_err(Failure::of_fault)?;
         let fault = count_fault(target, &simplified);
         let mut record = Simplify {
@@ -376,31 +369,8 @@ impl Run {
         };
         fill_costs(&mut record, &run.times);
         fill_result(&mut record, &simplified);
-        let facts = json!({ "asked": level.to_string(), "simplify": record, "max_error": search });
+        let asked = run.level.to_string();
+        let facts = json!({ "asked": asked, "simplify": record, "max_error": search });
         Ok((simplified, facts))
-    }
-
-    /// The level with the fewest spheres within an error bound, as the command searches it.
-    fn search(&self, bound: f64, context: &RunContext) -> Result<(Level, Value), Failure> {
-        let judge = self.start.judge(None, JudgeOptions::default())?;
-        let view = self.start.view();
-        let mut prepared = self.method.get().prepare(&view, &self.params, context)?;
-        let most = self.start.initial()?.spheres.len();
-        let measure = |mesh: &MedialMesh| {
-            judge.distances(mesh).map(|found| found.hausdorff).map_err(|error| error.to_string())
-        };
-        // A search can be cancelled between two levels.
-        let trying = |_: Level| {
-            let _ = context.step(0, usize::MAX);
-        };
-        let sweep = self.method.sweep();
-        let is_incremental = self.method.get().info().incremental;
-        let mut search =
-            Search::new(prepared.as_mut(), is_incremental, sweep, most, &measure, &trying);
-        let found = search.within(bound)?;
-        let Found { within: Some(Probe { level, error, .. }), tried, .. } = found else {
-            return Err(Failure::parameter(found.refusal(bound)));
-        };
-        Ok((level, json!({ "bound": bound, "hausdorff": error, "tried": tried })))
     }
 }

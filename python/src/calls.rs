@@ -212,10 +212,12 @@ impl Failure {
 
     /// The failure of a fault of the runner.
     pub fn of_fault(fault: Fault) -> Self {
+        if fault.is_bug() {
+            return Self::of_panic(&fault.reason);
+        }
         let kind = match fault.status {
             Status::Unsupported => Kind::Unsupported,
-            Status::Refused => Kind::Parameter,
-            Status::Panicked => return Self::of_panic(&fault.reason),
+            Status::Refused | Status::BoundMissed => Kind::Parameter,
             _ => Kind::Failed,
         };
         Self::new(kind, fault.reason)

@@ -148,6 +148,17 @@ def test_levels(axis: MedialAxis) -> None:
         axis.simplify("qmat", spheres=10, level=3.0)
 
 
+@pytest.mark.parametrize("method", ["tight", "qmat", "hem", "angle"])
+def test_an_error_bound_gives_the_file_of_the_command(method: str, tmp_path: Path) -> None:
+    by_command, by_python = tmp_path / "command.ma", tmp_path / "python.ma"
+    words = ["simplify", "builtin:box:8", "-m", method, "--max-error", "0.05", "--json", "--seed", "7", "-o"]
+    printed = json.loads(command(*words, by_command))["max_error"]
+    axis = Mesh.read("builtin:box:8").medial_axis(seed=7).simplify(method, max_error=0.05, seed=7)
+    axis.save(by_python)
+    assert by_python.read_bytes() == by_command.read_bytes()
+    assert axis.run is not None and axis.run.max_error == printed
+
+
 def test_distances_to_a_tetrahedron() -> None:
     mesh = Mesh(*TETRAHEDRON)
     points = [[0.125, 0.125, 0.125], [0.25, 0.25, -2.0], [0.25, 0.25, 0.0]]

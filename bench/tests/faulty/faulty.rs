@@ -22,6 +22,7 @@ struct Faulty {
 
 impl MedialSimplifier for Faulty {
     fn info(&self) -> &MethodInfo {
+        assert!(std::env::var_os("FAULTY_INFO").is_none(), "FAULTY_INFO is set");
         &self.info
     }
 
@@ -144,6 +145,17 @@ fn orphans() -> Result<(), SimplifyError> {
     started.map(|_| ()).map_err(|error| SimplifyError::Failed(error.to_string()))
 }
 
+/// Sends events without a pause, while a program that it started takes memory, 4 GB at most.
+#[allow(clippy::print_stdout)]
+fn chatters() -> Result<(), SimplifyError> {
+    let script = "ulimit -S -d 4000000; exec tail -n 1 /dev/zero";
+    let started = Command::new("sh").args(["-c", script]).spawn();
+    started.map_err(|error| SimplifyError::Failed(error.to_string()))?;
+    loop {
+        println!("\n\u{1e}\"Loading\"");
+    }
+}
+
 /// Returns another result each time.
 fn random(shape: &Shape, level: Level, is_first: bool) -> Outcome {
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
@@ -156,6 +168,16 @@ fn random(shape: &Shape, level: Level, is_first: bool) -> Outcome {
 /// Returns one ball at its first level: a level of a search has another result when it runs alone.
 fn warms_up(shape: &Shape, level: Level, is_first: bool) -> Outcome {
     largest(shape, if is_first { Level::Spheres(1) } else { level }, is_first)
+}
+
+/// Returns half of the balls at its first level.
+fn forgets(shape: &Shape, level: Level, is_first: bool) -> Outcome {
+    match level {
+        Level::Spheres(count) if is_first => {
+            largest(shape, Level::Spheres(count.div_ceil(2)), is_first)
+        }
+        _ => largest(shape, level, is_first),
+    }
 }
 
 fn main() -> ExitCode {
@@ -179,9 +201,11 @@ fn main() -> ExitCode {
         early("orphans", orphans),
         late("random", random),
         late("warms-up", warms_up),
+        late("forgets", forgets),
         early("waits", waits),
         late("hangs-late", hangs_late),
         early("complains", complains),
+        early("chatters", chatters),
     ]);
     medial_bench::main_with(methods)
 }

@@ -185,8 +185,12 @@ fn meshes_with_the_same_name_get_different_results() {
     assert_ne!(first, second);
 
     // A wrong word costs no earlier result, not even with --fresh.
-    let wrong: [(&[&str], i32); 8] = [
-        (&["--samples", "0"], 2),
+    let study = at("study.toml");
+    let named = "[[method]]\nid = \"qmat\"\nname = \"hem\"\nparams = { k = 0 }\n";
+    fs::write(&study, named).expect("written");
+    let wrong: [(&[&str], i32); 9] = [
+        (&["--samples", "99"], 2),
+        (&["--study", &study], 2),
         (&["--set", "qmat.k=x"], 2),
         (&["--repeat", "0"], 2),
         (&["--repeat", "1000000000000"], 2),

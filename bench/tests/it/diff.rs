@@ -62,6 +62,25 @@ fn two_builds_take_turns() {
     assert_eq!(run(&arguments), first);
     let foreign = [&["diff", "--run", "/bin/echo", MEDIAL], &options[..]].concat();
     refused(&foreign, 1, "echo: not a build of medial (`--version` printed \"");
+    // Programs with the name of the command that are no workers, or those of another protocol.
+    for (k, (script, found)) in [
+        ("exit 0", "the process ended with exit code 0"),
+        ("printf '\\n\\036\"Loading\"\\n'; read line", "no protocol"),
+        ("printf '\\n\\036{\"Ready\":0}\\n'; read line", "protocol 0"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let (program, out) = (at(&format!("foreign-{k}")), at(&format!("out-{k}")));
+        let text =
+            format!("#!/bin/sh\n[ \"$1\" = --version ] && echo medial 0.1.0 && exit\n{script}\n");
+        fs::write(&program, text).unwrap();
+        #[cfg(unix)]
+        fs::set_permissions(&program, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+        let foreign = ["diff", "--run", MEDIAL, &program, "--study", &study, "--out", &out, "-q"];
+        let expected = format!("foreign-{k}: not a worker of this build (found {found}, expected");
+        refused(&foreign, 1, &expected);
+    }
     let here = ["diff", "--run", MEDIAL, MEDIAL, "--study", &study, "--out", &at(".")];
     refused(&here, 1, "neither empty nor a folder of results");
 }

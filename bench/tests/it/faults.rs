@@ -6,7 +6,9 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::command::{MEDIAL, faulty, folder, processes_with, records, run_program, words};
+use crate::command::{
+    MEDIAL, done, ended, faulty, folder, json, processes_with, records, run_program, words,
+};
 
 /// Runs `compare` of the faulty methods on a box, which must end in a code, and returns its records.
 #[track_caller]
@@ -83,24 +85,83 @@ fn a_nondeterministic_method_gives_a_warning() {
 }
 
 #[test]
-fn a_bound_is_missed_when_the_level_found_misses_it_alone() {
-    const BOUND: f64 = 0.3;
-    let line = format!("--methods warms-up,qmat --max-error {BOUND} --spheres 30 --samples 500");
-    let records = compare(&line, &folder()("out"), 0);
-    let within = |method: &str| {
-        let mut found = records.iter().filter(|record| record["simplify"]["method"] == method);
-        let found = found.find(|record| record["simplify"]["level"]["max_error"] == BOUND);
-        found.unwrap_or_else(|| panic!("{method} has a record"))
-    };
-    let error = |record: &Value| record["evaluate"]["hausdorff"].as_f64().expect("measured");
-    let met = within("qmat");
-    assert!(met["status"] == "ok" && error(met) <= BOUND, "{met}");
-    // The search has found a level, but the recorded result is another.
-    let missed = within("warms-up");
-    assert!(error(missed) > BOUND, "{missed}");
-    assert_eq!([&missed["status"], &missed["simplify"]["status"]], ["bound_missed"; 2]);
-    let reason = missed["reason"].as_str().expect("a reason");
-    assert!(reason.contains("the level found gives"), "{reason}");
+fn the_error_of_a_bound_is_that_of_the_result() {
+    let at = folder();
+    let (mesh, file) = (at("box.off"), at("x.ma"));
+    done(&["datasets", "make", "box", "--resolution", "8", "-o", &mesh]);
+    // A level of `forgets` has fewer spheres alone than in the search. One that is within the bound alone, too, is
+    // written, and what is printed is its error.
+    for (method, certify) in [("forgets", false), ("forgets", true), ("qmat", false)] {
+        let line = format!("simplify {mesh} -m {method} --max-error 0.2 --json -o {file}");
+        let certifying: &[&str] = if certify { &["--certify"] } else { &[] };
+        let (code, stdout, stderr) = run_program(faulty(), &[&words(&line), certifying].concat());
+        assert_eq!(code, 0, "{stdout}{stderr}");
+        let object: Value = serde_json::from_str(&stdout).expect("JSON");
+        let of_file = json(&["evaluate", &mesh, &file, "--certify", "0.001"]).1;
+        let printed = &object["max_error"];
+        assert_eq!(printed["spheres"], of_file["counts"]["spheres"], "{object}");
+        let number = |value: &Value| value.as_f64().expect("a number");
+        let (error, own) = (number(&printed["hausdorff"]), number(&of_file["hausdorff"]));
+        if certify {
+            let [lower, upper] = ["lower", "upper"].map(|end| number(&of_file["certified"][end]));
+            assert!(lower <= error && error <= upper + 0.05 * 0.2, "{object}, {of_file}");
+        } else {
+            assert!((error - own).abs() < 1e-6, "{object}, {of_file}");
+        }
+        assert!(own <= 0.2, "{of_file}");
+    }
+    // No level of `warms-up` is within the bound alone.
+    let line = "--methods warms-up --max-error 0.3 --spheres 30 --samples 500";
+    let records = compare(line, &at("out"), 0);
+    let missed = records.iter().find(|record| record["simplify"]["level"]["max_error"] == 0.3);
+    assert_eq!(missed.expect("a record")["status"], "bound_missed");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn the_memory_of_a_worker_that_sends_events_is_limited() {
+    let line = "--methods chatters --spheres 30 --samples 100 --timeout 60 --memory 1000";
+    let ends = ends(&compare(line, &folder()("out"), 5));
+    let (status, reason) = &ends[&("chatters".to_owned(), 30)];
+    assert!(status == "out_of_memory" && reason.contains("1000 MB"), "{status}, {reason}");
+}
+
+#[test]
+#[cfg(unix)]
+fn an_item_that_ended_its_worker_runs_again_by_the_printed_command() {
+    let at = folder();
+    let line = format!(
+        "compare builtin:box:8 --counts-only --quiet --out {} --methods aborts --spheres 30 --samples 100",
+        at("out")
+    );
+    let (_, _, stderr) = run_program(faulty(), &words(&line));
+    let command = stderr.split('`').nth(1).unwrap_or_else(|| panic!("a command: {stderr}"));
+    assert!(command.starts_with("medial worker "), "{stderr}");
+    let again = format!("'{}' {}", faulty().display(), &command["medial ".len()..]);
+    let (code, stdout, stderr) = run_program("sh", &["-c", &format!("{again}; exit $?")]);
+    assert_eq!(code, 128 + 6, "{stdout}{stderr}");
+    assert!(stdout.contains("Preparing"), "{stdout}");
+}
+
+#[test]
+fn a_panic_of_the_command_is_a_failure_of_one_line() {
+    let at = folder();
+    // Of the command, where methods are listed, and of a method.
+    let lines = ["methods", "simplify builtin:box:8 -m panics --spheres 20 --json"];
+    for (line, message) in lines.into_iter().zip(["FAULTY_INFO", "panics at 20 spheres"]) {
+        let run = |backtrace: &str| {
+            let mut command = Command::new(faulty());
+            command.args(words(line)).env("RUST_BACKTRACE", backtrace);
+            let command =
+                if line == "methods" { command.env("FAULTY_INFO", at("")) } else { &mut command };
+            ended(command.output().expect("it starts"))
+        };
+        let (code, _, stderr) = run("0");
+        assert!(code == 70 && stderr.lines().count() == 1, "{code}: {stderr}");
+        let advice = "this is a bug of medial, please report it with the input";
+        assert!(stderr.contains(message) && stderr.trim_end().ends_with(advice), "{stderr}");
+        assert!(run("1").2.contains("stack backtrace"));
+    }
 }
 
 /// A plug-in file with faulty programs, each a line for `sh`.

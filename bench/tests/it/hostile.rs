@@ -167,7 +167,7 @@ fn the_surface_is_named_where_it_is_at_fault() {
     fs::write(&axis, "1 0 0\nv 0 0 0 0.5\n").expect("written");
     // A mesh that `info` accepts is evaluated, and a refused mesh is named.
     let accepted = run(&["info", &far]).0;
-    let (code, _, stderr) = run(&["evaluate", &far, &axis, "--samples", "99"]);
+    let (code, _, stderr) = run(&["evaluate", &far, &axis, "--samples", "100"]);
     assert_eq!(code, accepted, "{stderr}");
     assert!(code == 0 || stderr.contains("far.off"), "{stderr}");
 }
