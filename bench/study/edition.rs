@@ -105,18 +105,16 @@ pub enum EditionError {
         /// Hash in the description.
         expected: String,
     },
-    /// Its numbers have other definitions.
+    /// Its numbers have later definitions.
     #[error(
-        "edition {name}: the numbers have other definitions (found version {edition}, expected {DEFINITIONS}); \
-         {advice}"
+        "edition {name}: the numbers have other definitions (found version {edition}, expected at most \
+         {DEFINITIONS}); use a later build of medial or omit --against"
     )]
     Definitions {
         /// The edition.
         name: String,
         /// Version of its metrics.
         edition: u32,
-        /// Editions of this program with its definitions, or the way to make one.
-        advice: String,
     },
     /// The study measures in another way.
     #[error(
@@ -186,7 +184,7 @@ impl Edition {
     /// Opens an edition by its name or folder.
     ///
     /// # Errors
-    /// Unless it is known, unaltered, and measured by the definitions of this program.
+    /// Unless it is known, unaltered, and measured by no later definitions than those of this program.
     pub fn open(name: &Path) -> Result<Self, EditionError> {
         let embedded = EDITIONS.iter().find(|edition| Path::new(edition.name) == name);
         let file = |of: &str| embedded.map_or_else(|| name.join(of), |_| PathBuf::from(of));
@@ -218,15 +216,26 @@ impl Edition {
             let expected = description.sha256;
             return Err(EditionError::Changed { name, found, expected });
         }
-        if description.metrics != DEFINITIONS {
-            let edition = description.metrics;
-            return Err(EditionError::Definitions { name, edition, advice: alternatives() });
+        if description.metrics > DEFINITIONS {
+            return Err(EditionError::Definitions { name, edition: description.metrics });
         }
         let unpacked = unpack(&packed).map_err(|error| failed(RECORDS, error.to_string()))?;
         if let Some(line) = unpacked.bad_lines.first() {
             return Err(failed(RECORDS, line.to_string()));
         }
         Ok(Self { description, records: unpacked.records })
+    }
+
+    /// A note where the numbers have earlier definitions than those of this program.
+    fn earlier_definitions(&self) -> Option<String> {
+        let Description { name, metrics, .. } = &self.description;
+        (*metrics < DEFINITIONS).then(|| {
+            format!(
+                "Edition {name} was measured by version {metrics} of the metrics' definitions, here is version \
+                 {DEFINITIONS}: errors of unions that fill cavities are too small there, other maxima are equal, and \
+                 means differ by less than 0.1 % of themselves."
+            )
+        })
     }
 
     /// Refuses a study whose results do not compare with those of the edition, before any run.
@@ -302,11 +311,15 @@ impl Edition {
             }
             names => format!("; this program has other versions of {}", names.join(", ")),
         };
+        let definitions = match self.description.metrics < DEFINITIONS {
+            true => "; measured by earlier definitions of the metrics",
+            false => "",
+        };
         let error = evaluation.distances.hausdorff;
         // The same result read from a file differs in its last digits.
         let rank = 1 + errors.iter().filter(|&&other| other < (1.0 - 1e-9) * error).count();
         format!(
-            "{} %: rank {rank} of {} at {count} spheres on {} ({name}{versions})",
+            "{} %: rank {rank} of {} at {count} spheres on {} ({name}{versions}{definitions})",
             significant(100.0 * error, 3),
             errors.len() + 1,
             mesh.name
@@ -386,7 +399,7 @@ impl Edition {
         }
         frozen.retain(|record| !repeated[&row(record)]);
         records.extend(frozen);
-        let mut notes = vec![];
+        let mut notes: Vec<String> = self.earlier_definitions().into_iter().collect();
         let mean = |ratios: &[f64]| {
             let sum: f64 = ratios.iter().map(|ratio| ratio.ln()).sum();
             significant((sum / ratios.len() as f64).exp(), 3)
@@ -444,18 +457,3 @@ impl Edition {
 
 /// Errors below this share of the diagonal are rounding.
 const NEGLIGIBLE: f64 = 1e-9;
-
-/// The editions of this program with its definitions of the metrics, as advice.
-fn alternatives() -> String {
-    let of = |known: &&Embedded| {
-        let description: Option<Description> = toml::from_str(known.description).ok();
-        description.is_some_and(|description| description.metrics == DEFINITIONS)
-    };
-    let names: Vec<&str> = EDITIONS.iter().filter(of).map(|known| known.name).collect();
-    match names.is_empty() {
-        true => {
-            "omit --against, or freeze results by `medial report DIR --freeze EDITION`".to_owned()
-        }
-        false => format!("use {}", names.join(" or ")),
-    }
-}

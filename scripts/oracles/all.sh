@@ -38,7 +38,7 @@ say() { # metric oracle input result agrees
 python=${ORACLE_PYTHON:-$work/python/bin/python}
 if ! "$python" -c 'import open3d, gudhi, trimesh' 2>/dev/null; then
     python3 -m venv "$work/python" &&
-        "$work/python/bin/pip" install --quiet open3d gudhi trimesh >"$work/pip.log" 2>&1 || true
+        "$work/python/bin/pip" install --quiet open3d gudhi trimesh scipy >"$work/pip.log" 2>&1 || true
 fi
 has_python=yes
 "$python" -c 'import open3d, gudhi, trimesh' 2>"$work/python.log" || has_python=
@@ -121,10 +121,12 @@ for name in $names; do
     done
 done
 
-# 3. One-sided errors of spheres, by a million points each.
+# 3. One-sided errors of spheres, by a million points each, and certified intervals of filled cavities.
 # shellcheck disable=SC2086 # a list of files without spaces
 "$python" scripts/oracles/cover.py "$medial" "$work" $names >"$work/cover.txt" || true
 tail -n 1 "$work/cover.txt" | tee -a "$rows"
+"$python" scripts/oracles/cavities.py "$medial" "$work" >"$work/cavities.txt" || true
+tail -n 1 "$work/cavities.txt" | tee -a "$rows"
 
 # 4. The triangulation that the initial medial mesh is made of.
 for name in $names; do

@@ -3,7 +3,8 @@
     witness.py MESH AXIS.ma EVALUATION.json
 
 Prints two fractions of the diagonal: how far the witness is off the surface that it should be on, and its
-distance from the other one. Distances to cones and slabs are minima over their balls, which are convex: found
+distance from the other one. The word `inside` follows where the witness is on the surface and in the union. The distance is
+then the depth in one primitive, which can be less than that to the union's boundary. Distances to cones and slabs are minima over their balls, which are convex: found
 by golden sections. Plain Python: no package is needed.
 """
 
@@ -127,11 +128,12 @@ def main():
     p = witness["point"]
     points, faces = read_surface(surface_file)
     to_surface = min(to_triangle(p, *(points[k] for k in face)) for face in faces) / diagonal
-    to_union = abs(signed(p, *read_axis(axis_file))) / diagonal
+    to_union = signed(p, *read_axis(axis_file)) / diagonal
+    side = "inside" if witness["on"] == "surface" and to_union < 0 else "outside"
     off, distance = (
-        (to_surface, to_union) if witness["on"] == "surface" else (to_union, to_surface)
+        (to_surface, abs(to_union)) if witness["on"] == "surface" else (abs(to_union), to_surface)
     )
-    print(f"{off:.12g} {distance:.12g}")
+    print(f"{off:.12g} {distance:.12g} {side}")
 
 
 main()

@@ -15,7 +15,7 @@
 //!
 //! The result is the distance at an actual point of the surface: still a lower bound of the true
 //! maximum. Directions and ties follow the pose, so the result does not change when the shape is
-//! turned ([`super::pose`]). Each round ends before the next begins, and seeds are independent within
+//! turned ([`Pose`]). Each round ends before the next begins, and seeds are independent within
 //! it: the result is the same for any number of threads.
 
 use rayon::prelude::*;
@@ -55,8 +55,7 @@ const GAIN: f64 = 1e-10;
 pub struct Peak {
     /// A point of the surface, or of the union's boundary.
     pub point: Vec3,
-    /// How far it is from the other one: `|sigma|` of a point of the surface, the distance from the
-    /// surface of a point of the union's boundary.
+    /// Distance from the other surface.
     pub distance: f64,
 }
 

@@ -3,30 +3,31 @@
 //! With the surface S, the union U of all medial primitives and `sigma` their least signed
 //! distance, the certified quantity is the larger of
 //!
-//! - (a) the largest `|sigma(p)|` over the points `p` of S, and
+//! - (a) the largest distance to the boundary of U over the points of S, and
 //! - (b) the largest distance to S over the points of the boundary of U.
 //!
 //! [`Distances`](super::Distances) samples these as `epsilon_union` and `reverse`. Outside
-//! U, `sigma` is the distance to U; inside, `-sigma` is the depth in the deepest single
-//! primitive, which is less than the depth in U where primitives cover each other.
+//! U, `sigma` is the distance to its boundary. Inside, `-sigma` is only a lower bound of it ([`super::depth`]).
 //!
-//! The method is branch and bound. The pieces are triangles of S, and the triangles, cone laterals
-//! and spherical triangles that make up the surfaces of all primitives. They are divided until the
-//! distances in each are known to be below `lower + tolerance`, where `lower` is the largest distance
-//! found so far at a point that is certainly on S or on the boundary of U:
+//! The method is branch and bound. The pieces are triangles of S, and the pieces of the surfaces of all
+//! primitives ([`super::pieces`]). They are divided until the distances in each are known to be below
+//! `lower + tolerance`, where `lower` is the largest distance found so far at a point that is certainly on S
+//! or on the boundary of U:
 //!
 //! 1. Distances are 1-Lipschitz: in a piece they differ from that at its centre by at most the extent
 //!    of the piece.
 //! 2. The signed distance to a primitive, a convex body, is a convex function, and so is the
 //!    distance to one triangle. Over a piece neither exceeds its largest value at the corners of a
 //!    convex polytope around the piece. So one primitive bounds `sigma` from above, and one triangle
-//!    the distance to S. The error is of second order in the size of the piece (file
-//!    `union_side.rs`).
-//! 3. A convex function is nowhere below its tangent plane. For each primitive that could be deep
-//!    enough, the tangent plane at the centre of the piece bounds its signed distance from below
-//!    (file `surface_side.rs`).
-//! 4. If 1 or 2 prove that another primitive contains a piece, the piece is not on the boundary of U
-//!    and is dropped.
+//!    the distance to S. The error is of second order in the size of the piece.
+//! 3. A point of S in U is at most as far from the boundary as from any point outside U. All points of a
+//!    triangle of S share one such point, or the triangle moved by `lower + tolerance` is outside: a convex
+//!    function is nowhere below its tangent plane, and for each primitive near the moved triangle the plane
+//!    at the triangle's centre shows that.
+//! 4. If 1 or 2 prove that another primitive contains a piece of a primitive's surface, the piece is not on
+//!    the boundary of U and is dropped.
+//! 5. Where the bounds of the distance at the centre of a triangle are far apart, that point is searched
+//!    alone.
 //!
 //! All pieces of one size are evaluated in one round, so the result is the same for any number of
 //! threads.

@@ -2,12 +2,13 @@
 //!
 //! 1. The surface S is sampled uniformly by area, and its vertices are added, because the largest
 //!    error is usually at one. Every medial mesh gets the same samples ([`super::samples`]).
-//! 2. Each sample is measured against the union U: `|sigma|` and `mu` of
+//! 2. Each sample is measured against the union U: its distance to the boundary of U, which is the signed
+//!    distance to the nearest primitive outside U and bounded from both sides inside ([`super::depth`]), `mu` of
 //!    [`MedialUnion`], and `|sigma|` of the spheres alone.
 //! 3. The boundary of U is sampled uniformly by area ([`super::envelope`]) and measured against S.
 //! 4. From the largest samples of each distance, local ascent looks for the maximum
 //!    ([`super::ascent`]).
-//! 5. Both surfaces are swept for places where `|sigma|` or the distance to S exceeds the larger maximum
+//! 5. Both surfaces are swept for places where the distance to the other one exceeds the larger maximum
 //!    ([`super::sweep`]).
 //!
 //! Means, root mean squares and percentiles are over the area-uniform samples; maxima are over all
@@ -18,9 +19,9 @@
 //!   distances are 1-Lipschitz, it falls short by at most the largest distance from a point of the
 //!   surface to the nearest sample, and only if neither an ascent nor the sweep reached the true place. Only
 //!   [`certify`](super::certify) proves a maximum.
-//! - Where S runs inside U, `|sigma|` is a lower bound of the distance to the boundary of U:
-//!   `epsilon_union` is the distance between the surfaces only where S runs outside U. The reverse
-//!   distance, which is exact, covers the other case.
+//! - Means and percentiles take upper bounds where S is inside U and the nearest exit is buried: the nearest
+//!   sample of the boundary, farther than its nearest point by at most the samples' spacing. Maxima are searched
+//!   until they are lower bounds.
 //! - A point that another primitive covers by less than the burial depth counts as on U's boundary,
 //!   with a weight that falls to 0 at this depth. So strips along the curves where neighbouring
 //!   primitives touch count more than once in `reverse_mean`.

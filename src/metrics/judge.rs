@@ -486,13 +486,13 @@ pub struct Distances {
     /// Largest distance from a point of S to the nearest primitive's surface, buried or not:
     /// the reading of the Q-MAT paper.
     pub epsilon: f64,
-    /// Largest absolute signed distance from a point of S to the union.
+    /// Largest distance from a point of S to the union's boundary.
     pub epsilon_union: f64,
     /// Largest distance from a point of the union's boundary to the surface.
     pub reverse: f64,
     /// `max(epsilon_union, reverse)`.
     pub hausdorff: f64,
-    /// Mean over the area-uniform surface samples of the absolute signed distance to the union.
+    /// Mean over the area-uniform surface samples of the distance to the union's boundary.
     pub mean: f64,
     /// Root mean square of the same.
     pub rms: f64,
@@ -502,7 +502,7 @@ pub struct Distances {
     pub p99: f64,
     /// Mean distance from the boundary of the union to the surface, by area.
     pub reverse_mean: f64,
-    /// `epsilon_union` with the spheres alone, without cones and slabs.
+    /// Largest absolute signed distance from a point of S to the spheres alone, without cones and slabs.
     pub spheres_only: f64,
     /// Number of surface samples, the mesh vertices included.
     pub samples: usize,
