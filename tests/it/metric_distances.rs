@@ -445,6 +445,82 @@ fn buried_parts_do_not_count() {
     assert!((alone.lower - both.lower).abs() <= 1e-4 && (alone.upper - both.upper).abs() <= 1e-4);
 }
 
+/// The block `[0, 3] x [0, 2] x [0, 1]` without the box between two corners, which may reach its sides: cells of a grid,
+/// and the squares between full and empty ones.
+fn block_without(lo: Vec3, hi: Vec3) -> TriMesh {
+    let size = [3.0, 2.0, 1.0];
+    let cuts: [Vec<f64>; 3] = std::array::from_fn(|k| {
+        let mut cuts = vec![0.0, lo[k], hi[k], size[k]];
+        cuts.dedup();
+        cuts
+    });
+    let is_full = |cell: [i32; 3]| {
+        let at = |k: usize| usize::try_from(cell[k]).ok().filter(|&c| c + 1 < cuts[k].len());
+        let Some(cell) = at(0).and_then(|x| Some([x, at(1)?, at(2)?])) else { return false };
+        !(0..3).all(|k| (lo[k]..hi[k]).contains(&cuts[k][cell[k]]))
+    };
+    let (mut ids, mut mesh) = (std::collections::HashMap::new(), TriMesh::default());
+    let cells = |k: usize| 0..cuts[k].len() as i32 - 1;
+    for cell in cells(0).flat_map(|x| cells(1).flat_map(move |y| cells(2).map(move |z| [x, y, z])))
+    {
+        for (axis, side) in (0..3).flat_map(|axis| [(axis, 0), (axis, 1)]) {
+            let mut other = cell;
+            other[axis] += 2 * side - 1;
+            if !is_full(cell) || is_full(other) {
+                continue;
+            }
+            let mut square = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[a, b]| {
+                let mut corner = cell;
+                corner[axis] += side;
+                corner[(axis + 1) % 3] += a;
+                corner[(axis + 2) % 3] += b;
+                *ids.entry(corner).or_insert_with(|| {
+                    mesh.vertices
+                        .push(Vec3::from_array([0, 1, 2].map(|k| cuts[k][corner[k] as usize])));
+                    mesh.vertices.len() as u32 - 1
+                })
+            });
+            if side == 0 {
+                square.reverse();
+            }
+            let [a, b, c, d] = square;
+            mesh.faces.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    mesh
+}
+
+/// The axis of a whole block fills slots, pockets, tubes and cavities of any width, whose walls are far from its boundary.
+#[test]
+fn filled_cavities_are_as_far_as_their_walls() {
+    let (_, axis) = cuboid(3.0, 2.0, 1.0);
+    for width in [0.002, 0.02, 0.2] {
+        let [low, high] = [1.5 - width / 2.0, 1.5 + width / 2.0];
+        for (lo, hi) in [
+            // A slot through the block, a pocket, a tube and a closed cavity.
+            (Vec3::new(low, 0.0, 0.2), Vec3::new(high, 2.0, 1.0)),
+            (Vec3::new(low, 0.5, 0.2), Vec3::new(high, 1.5, 1.0)),
+            (Vec3::new(low, 0.9, 0.0), Vec3::new(high, 0.9 + width, 1.0)),
+            (Vec3::new(low, 0.5, 0.2), Vec3::new(high, 1.5, 0.8)),
+        ] {
+            let mut surface = block_without(lo, hi);
+            medial::surface::validate(&surface).expect("a solid");
+            // Half way up every wall, as far from the top as from the bottom.
+            let exact = 0.5 / 14_f64.sqrt();
+            surface.vertices.iter_mut().for_each(|v| *v /= 14_f64.sqrt());
+            let axis = axis.transformed(1.0 / 14_f64.sqrt(), |p| p / 14_f64.sqrt());
+            let measured = measure(&surface, &axis);
+            let share = measured.hausdorff / exact;
+            assert!((0.999..1.0 + 1e-9).contains(&share), "{share} of {exact}, {lo} to {hi}");
+            assert_eq!(measured.hausdorff, measured.epsilon_union);
+            let bvh = TriangleBvh::new(&surface).unwrap();
+            let found = certify(&surface, &bvh, &axis, 1e-3).unwrap();
+            assert!((found.lower..=found.upper).contains(&exact), "{exact} is not in {found:?}");
+            assert!(found.upper - found.lower <= 1e-3);
+        }
+    }
+}
+
 #[test]
 fn the_interval_agrees_with_samples_on_random_meshes() {
     let mut rng = Pcg64::seed_from_u64(7);

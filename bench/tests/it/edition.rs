@@ -138,7 +138,11 @@ fn editions_that_do_not_compare_are_refused_before_any_run() {
     let equal = named("builtin:capsule --samples 500");
     // One digit more is a later version.
     fs::write(&description, text.replace("metrics = ", "metrics = 9")).expect("written");
-    against(&equal, 1, &format!("the numbers have other definitions (found version 9{DEFINITIONS}, "));
+    against(
+        &equal,
+        1,
+        &format!("the numbers have other definitions (found version 9{DEFINITIONS}, "),
+    );
     fs::write(&description, text.replace("metrics = ", "measures = ")).expect("written");
     against(&equal, 1, "edition.toml: line ");
     fs::write(&description, &text).expect("written");
