@@ -325,10 +325,11 @@ impl StructureSurface {
                 }
             }
         }
-        let surrounds =
-            (0..).zip(&near).any(|(k, (_, to))| near[parts.find(k) as usize].1.dot(*to) < 0.0);
+        let mut ways: Vec<(u32, Vec3)> =
+            (0..).zip(&near).map(|(k, (_, to))| (parts.find(k), to.normalize_or_zero())).collect();
+        ways.sort_by_key(|way| way.0);
         match parts.len() {
-            _ if surrounds => ContactType::Curve,
+            _ if ways.chunk_by(|a, b| a.0 == b.0).any(surrounds) => ContactType::Curve,
             1 => ContactType::Boundary,
             2 => ContactType::Sheet,
             3 => ContactType::Seam,
@@ -729,6 +730,15 @@ fn partners(
     best.collect()
 }
 
+/// Whether two of the directions to one part of the surface are more than a right angle apart.
+fn surrounds(ways: &[(u32, Vec3)]) -> bool {
+    // Directions within 45 degrees of one of them are within 90 degrees of each other.
+    let is_narrow = ways.iter().all(|way| way.1.dot(ways[0].1) >= std::f64::consts::FRAC_1_SQRT_2);
+    let is_opposite =
+        |(k, way): (usize, &(u32, Vec3))| ways[..k].iter().any(|w| w.1.dot(way.1) < 0.0);
+    !is_narrow && ways.iter().enumerate().any(is_opposite)
+}
+
 #[cfg(test)]
 mod tests {
     use rand::{RngExt, SeedableRng};
@@ -754,6 +764,32 @@ mod tests {
         let points: Vec<Vec3> = (0..600).map(|k| side(k % 6, &mut random)).collect();
         let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
         StructureSurface::new(&mesh, Arc::new(tree), Arc::new(inside), &points)
+    }
+
+    /// A prism whose wall is an arc of 120 degrees around an axis, and far from it elsewhere.
+    #[test]
+    fn contacts_do_not_depend_on_the_order_of_faces() {
+        let turn = |degrees: f64| (degrees.to_radians().cos(), degrees.to_radians().sin());
+        let mut ring: Vec<(f64, f64)> = (0..=24).map(|k| turn(f64::from(k) * 5.0 - 60.0)).collect();
+        ring.extend([(-4.0, 3.0), (-4.0, -3.0)]);
+        let count = ring.len() as u32;
+        let at = |z: f64| ring.iter().map(move |&(x, y)| 0.1 * Vec3::new(x, y, z));
+        let vertices = at(-4.0).chain(at(4.0)).collect();
+        let mut faces: Vec<[u32; 3]> = Vec::new();
+        for a in 0..count {
+            let b = (a + 1) % count;
+            faces.extend([[a, b, b + count], [a, b + count, a + count]]);
+        }
+        faces.extend(
+            (1..count - 1).flat_map(|k| [[0, k + 1, k], [count, count + k, count + k + 1]]),
+        );
+        let mut mesh = TriMesh { vertices, faces };
+        for turn in 0..mesh.faces.len() {
+            mesh.faces.rotate_left(1);
+            let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
+            let surface = StructureSurface::new(&mesh, Arc::new(tree), Arc::new(inside), &[]);
+            assert_eq!(surface.contacts(Vec3::ZERO), ContactType::Curve, "turned by {turn}");
+        }
     }
 
     fn structure(mesh: &MedialMesh) -> Structure {
