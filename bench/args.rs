@@ -3,15 +3,17 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::RangedU64ValueParser;
+use clap::builder::{PossibleValue, PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
+use medial::complex::DualTriangulation;
 use medial::metrics::JudgeOptions;
 use medial::shape::ShapeOptions;
 use medial::simplifier::Params;
 use medial::surface::Sampling;
+use medial_run::axis::{AxisOptions, FitBy, RadiiFrom};
+use serde::de::DeserializeOwned;
 
 use crate::exit::Failure;
 use crate::progress::Verbosity;
-use crate::study::item::Dual;
 use crate::study::registry::{Entry, Registry};
 use crate::study::{LEAST_SAMPLES, MOST_SAMPLES, MOST_THREADS, Study};
 
@@ -59,8 +61,8 @@ pub struct SubstrateArguments {
     #[arg(long, value_name = "SAMPLING")]
     pub sampling: Option<String>,
     /// Triangulation of the dual Voronoi polygons [default: fan].
-    #[arg(long, value_enum)]
-    pub dual: Option<Dual>,
+    #[arg(long, value_parser = dual())]
+    pub dual: Option<DualTriangulation>,
     /// Set the seed of every random choice [default: 0].
     #[arg(long)]
     pub seed: Option<u64>,
@@ -87,7 +89,7 @@ impl SubstrateArguments {
     /// # Errors
     /// When the sampling is not understood.
     pub fn shape_options(&self) -> Result<ShapeOptions, Failure> {
-        let dual = self.dual.unwrap_or_default().into();
+        let dual = self.dual.unwrap_or_default();
         Ok(ShapeOptions { sampling: self.sampling()?, dual })
     }
 
@@ -103,6 +105,56 @@ impl SubstrateArguments {
             study.sampling = self.sampling()?;
         }
         Ok(())
+    }
+}
+
+/// A value among the words of an enumeration in JSON, each with its help.
+pub fn word<T>(words: &[(&'static str, &'static str)]) -> impl TypedValueParser<Value = T> + use<T>
+where
+    T: DeserializeOwned + Clone + Send + Sync + 'static,
+{
+    let values = words.iter().map(|&(word, help)| PossibleValue::new(word).help(help));
+    PossibleValuesParser::new(values.collect::<Vec<_>>())
+        .map(|word| serde_json::from_value(word.into()).expect("a word of the enumeration"))
+}
+
+fn dual() -> impl TypedValueParser<Value = DualTriangulation> {
+    word(&[("fan", "A fan, as published"), ("delaunay", "Planar Delaunay")])
+}
+
+fn radii() -> impl TypedValueParser<Value = RadiiFrom> {
+    word(&[("file", "From the file"), ("surface", "The distance of each centre to the surface")])
+}
+
+fn fit() -> impl TypedValueParser<Value = FitBy> {
+    word(&[
+        ("none", "The file is in the units of the surface"),
+        ("similarity", "Apply the uniform scale and the shift that fit the spheres to the surface"),
+        ("auto", "As `similarity`, for files that fit only after scaling"),
+    ])
+}
+
+/// How medial meshes are read and fitted to their surface.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct AxisArguments {
+    /// Read all lines of a medial mesh whose header states a different number.
+    #[arg(long)]
+    lenient: bool,
+    /// Read the K-th medial mesh, or link of a robot, of a file that holds several, counted from 1.
+    #[arg(long, value_name = "K")]
+    block: Option<usize>,
+    /// Read radii from the file, or compute them where it has none or other numbers instead.
+    #[arg(long, default_value = "file", value_parser = radii())]
+    radii: RadiiFrom,
+    /// Convert the units of the medial mesh to those of the surface, and print the scale and shift.
+    #[arg(long, default_value = "none", value_parser = fit())]
+    fit: FitBy,
+}
+
+impl From<AxisArguments> for AxisOptions {
+    fn from(arguments: AxisArguments) -> Self {
+        let AxisArguments { lenient, block, radii, fit } = arguments;
+        Self { lenient, block, radii, fit }
     }
 }
 
@@ -152,12 +204,6 @@ pub fn share(text: &str) -> Result<f64, String> {
 /// When it is none.
 pub fn fraction(text: &str) -> Result<f64, String> {
     number(text, |x| x > 0.0 && x <= 1.0, "a number above 0 and at most 1")
-}
-
-/// The tolerance to advise where one is too fine. The `sufficient` one is often much larger than necessary, so the
-/// `usual` one comes first.
-pub fn larger_tolerance(tolerance: f64, sufficient: f64, usual: f64) -> f64 {
-    sufficient.min(if tolerance < usual { usual } else { 1.0 })
 }
 
 fn number(text: &str, is_wanted: fn(f64) -> bool, expected: &str) -> Result<f64, String> {

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use clap::{Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use clap_complete::Shell;
 use medial::simplifier::Registered;
+use medial_run::timed::panic_message;
 
 use crate::args::Global;
 use crate::cmd;
@@ -14,7 +15,6 @@ use crate::exec::serve::serve;
 use crate::exit::{Exit, Failure};
 use crate::host::Host;
 use crate::interrupt;
-use crate::measure::answer::panic_message;
 use crate::output::{exit_after_output, print_failure, print_raw};
 use crate::plugin::ScriptLoader;
 use crate::study::registry::Registry;

@@ -4,13 +4,14 @@ use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
 
+use medial_run::axis::AxisError;
+use medial_run::input::InputError;
+use medial_run::library::PublicError;
+
 use crate::exec::RunError;
 use crate::store::StoreError;
 use crate::study::StudyError;
 use crate::study::edition::EditionError;
-use crate::study::external::AxisError;
-use crate::study::library::PublicError;
-use crate::study::source::InputError;
 
 /// Exit codes of the command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +76,6 @@ impl From<StudyError> for Failure {
     fn from(error: StudyError) -> Self {
         match error {
             StudyError::Input(error) => error.into(),
-            StudyError::Library(error) => error.into(),
             // A file is input, its values replace options.
             StudyError::File { .. } => Self::input(error),
             _ => Self::usage(error),

@@ -1,14 +1,14 @@
 //! Medial meshes that a user names, and outputs that are checked before the work for them is done.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-use medial::complex::{self, MedialMesh, READABLE, WRITABLE, single_precision_loss};
+use medial::complex::{self, MedialMesh, WRITABLE, single_precision_loss};
 use medial::shape::{Shape, ShapeOptions};
+use medial_run::axis::extension;
+use medial_run::input::{Input, Source};
 
 use crate::exit::Failure;
-use crate::study::source::{Input, Source};
 
 /// Reads a surface or makes a built-in one, and the shape of it. Errors name the surface.
 ///
@@ -18,30 +18,6 @@ pub fn shape_of(mesh: &Path, options: ShapeOptions) -> Result<(Input, Shape), Fa
     let input = Input::load(&Source::parse(mesh)?)?;
     let shape = input.shape(options).map_err(|error| Failure::at(mesh, error))?;
     Ok((input, shape))
-}
-
-/// The content of a file shows in its first bytes: no header of a PLY file is longer than these.
-const HEADER_LIMIT: u64 = 1 << 20;
-
-/// Whether a file holds a medial mesh: `.ma`, lists of spheres, `.ply` whose vertices have a radius,
-/// `.obj` whose vertices have a fourth number.
-///
-/// # Errors
-/// When it cannot be read.
-pub fn is_medial(path: &Path) -> Result<bool, Failure> {
-    match extension(path).as_str() {
-        // Surfaces and medial meshes share these extensions: their first lines decide.
-        "ply" => any_line(path, |words| match words {
-            [b"end_header"] => Some(false),
-            [b"property", _, b"radius" | b"r"] => Some(true),
-            _ => None,
-        }),
-        "obj" => any_line(path, |words| match words {
-            [b"v", coordinates @ ..] => Some(coordinates.len() == 4),
-            _ => None,
-        }),
-        other => Ok(READABLE.contains(&other)),
-    }
 }
 
 /// Opens a file of a user for reading.
@@ -67,22 +43,6 @@ pub fn left_out(path: &Path, mesh: &MedialMesh) -> Option<String> {
     }
 }
 
-/// The decision of the first line that has one.
-fn any_line(path: &Path, decide: impl Fn(&[&[u8]]) -> Option<bool>) -> Result<bool, Failure> {
-    let file = open_regular(path)?;
-    let mut reader = BufReader::new(file).take(HEADER_LIMIT);
-    let mut line = Vec::new();
-    while reader.read_until(b'\n', &mut line).map_err(|error| Failure::at(path, error))? > 0 {
-        let words: Vec<&[u8]> =
-            line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).collect();
-        if let Some(decision) = decide(&words) {
-            return Ok(decision);
-        }
-        line.clear();
-    }
-    Ok(false)
-}
-
 /// Refuses an output that could not be written, before the work for it is done.
 ///
 /// # Errors
@@ -93,10 +53,6 @@ pub fn check_output(output: Option<&Path>) -> Result<(), Failure> {
     check_extension(path, &WRITABLE)?;
     check_folder(path)
 }
-
-/// Corners of a power crust that are nearer than this along it become one in the surface that is written, as a
-/// fraction of the diagonal.
-pub const COINCIDENT: f64 = 1e-6;
 
 /// Extensions of surfaces that are written.
 pub const SURFACES: [&str; 3] = ["ply", "off", "obj"];
@@ -161,9 +117,4 @@ pub fn check_apart<'a>(
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     medial::write_atomically(path, |out| out.write_all(bytes))
         .map_err(|error| Failure::at(path, error))
-}
-
-/// Lower-case extension of a path, or nothing.
-pub fn extension(path: &Path) -> String {
-    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
 }

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | [`host`], [`process_tree`] | the process of the command, the end of child processes |
 //! | [`plugin`], [`check`] | methods as external programs, the conformance tests |
-//! | [`study`], [`measure`] | the items to run, from an output to its record |
+//! | [`study`] | the items to run |
 //! | [`store`], [`exec`] | the folder of records, the workers |
 //! | [`rebuild`] | the report of a store |
 //! | [`args`], [`exit`], [`output`], [`files`], [`interrupt`] | shared by the verbs |
@@ -23,7 +23,6 @@ pub mod exit;
 pub mod files;
 pub mod host;
 pub mod interrupt;
-pub mod measure;
 pub mod output;
 pub mod plugin;
 pub mod process_tree;

@@ -5,7 +5,8 @@ use std::io::{self, IsTerminal, Write};
 use std::sync::OnceLock;
 
 use medial::shape::Cost;
-use medial_reports::{printable, without_markup};
+use medial_reports::without_markup;
+use medial_run::text::printable;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 

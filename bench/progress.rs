@@ -8,7 +8,7 @@ use std::time::Duration;
 use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use medial::simplifier::Progress as Steps;
 use medial_methods::usual_seconds;
-use medial_reports::printable;
+use medial_run::text::printable;
 
 /// Interval between updates of a line.
 // A line draws itself, because most work does not report progress.

@@ -2,38 +2,21 @@
 
 use std::{env, fs, thread};
 
-use medial_reports::Machine;
-use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
+use medial_run::hash::hex_digest;
+use medial_run::record::{Machine, Provenance};
 
 use crate::host::Host;
-use std::fmt::Write as _;
 
-/// The facts that are the same for every record of a run.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct Provenance {
-    /// The machine.
-    pub machine: Machine,
-    /// SHA-256 of the running program.
-    pub binary_hash: String,
-    /// The command line.
-    pub command: String,
-    /// Version of the program.
-    pub version: String,
-}
-
-impl Provenance {
-    /// The provenance of the running process.
-    pub fn here() -> Self {
-        Self {
-            machine: machine(),
-            binary_hash: Host::here()
-                .and_then(|host| fs::read(&host.code))
-                // A program that cannot be read leaves no hash, and costs no result.
-                .map_or_else(|_| String::new(), |bytes| hex_digest(&bytes)),
-            command: command_line(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-        }
+/// The provenance of the running process.
+pub fn provenance() -> Provenance {
+    Provenance {
+        machine: machine(),
+        binary_hash: Host::here()
+            .and_then(|host| fs::read(&host.code))
+            // A program that cannot be read leaves no hash, and costs no result.
+            .map_or_else(|_| String::new(), |bytes| hex_digest(&bytes)),
+        command: command_line(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
     }
 }
 
@@ -78,17 +61,4 @@ fn command_line() -> String {
         }
     }
     line
-}
-
-/// SHA-256 in hexadecimal.
-pub fn hex_digest(bytes: &[u8]) -> String {
-    hex(&Sha256::digest(bytes))
-}
-
-/// Bytes in hexadecimal.
-pub fn hex(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }

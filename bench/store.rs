@@ -10,9 +10,10 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use medial::{read_regular, read_regular_text};
-use medial_reports::{Journal, JournalError, Record, Status, Target, file_inside, parse_records};
-
-use crate::study::item::Item;
+use medial_run::item::Item;
+use medial_run::journal::{Journal, JournalError, parse_records};
+use medial_run::level::Target;
+use medial_run::record::{Record, Status, file_inside};
 
 /// Name of the append-only list of records of a comparison.
 pub const RESULTS: &str = "results.jsonl";

@@ -4,13 +4,15 @@ use medial::Vec3;
 use medial::surface::TriMesh;
 use serde::Serialize;
 
-use crate::axes::{self, KnownAxis, box_axis};
-use crate::profiles::triangle;
+use crate::axes::{self, box_axis};
+use crate::bisectors::KnownAxis;
+use crate::profiles::{HOLED_HALF, triangle};
 use crate::shapes::{
     self, BLIND_HOLE, BLIND_HOLE_RADIUS, BOX_HALF, BRACKET, BRACKET_ELBOW, FILLETED_ELBOW, FRUSTUM,
-    PLATE_HALF, RIB, RIB_HALF, ROD_HALF, ROD_RADIUS, TUBE, TUBE_RADIUS, WEDGE, capsule_of,
-    diagonal_of, grid_box,
+    PLATE_HALF, RIB, RIB_HALF, ROD_HALF, ROD_RADIUS, TUBE, TUBE_RADIUS, WEDGE, diagonal_of,
+    grid_box,
 };
+use crate::solids::capsule_of;
 
 /// Finest resolution that is generated: some four million vertices.
 pub const MAX_RESOLUTION: u32 = 2000;
@@ -153,7 +155,7 @@ pub fn catalogue() -> Vec<BuiltIn> {
             shapes::rib, Some(|| RIB.profile().prism(0.0, RIB_HALF)), diagonal_of(shapes::RIB_EXTENT), false,
             "A plate of 0.3 with a thin rib of 0.12 across it: two reflex edges close to each other.";
         "holed-plate", "Plate with a hole", betti [1, 1, 0], resolution 40 from 16,
-            shapes::holed_plate, Some(axes::holed_plate), diagonal_of(shapes::HOLED_HALF), false,
+            shapes::holed_plate, Some(axes::holed_plate), diagonal_of(HOLED_HALF), false,
             "2.4 by 0.3 by 1.8 with a round hole of radius 0.5 through it, genus 1.";
         "blind-hole", "Cylinder with a blind hole", betti [1, 0, 0], resolution 28 from 10,
             shapes::blind_hole, Some(|| BLIND_HOLE.mirrored(BLIND_HOLE_RADIUS).revolved()), diagonal_of(shapes::BLIND_HOLE_EXTENT), false,

@@ -13,6 +13,7 @@
 //! ```
 
 mod axes;
+mod bisectors;
 mod catalogue;
 mod implicit;
 mod noise;
@@ -21,7 +22,7 @@ pub mod published;
 mod shapes;
 mod solids;
 
-pub use axes::KnownAxis;
+pub use bisectors::KnownAxis;
 pub use catalogue::{BuiltIn, MAX_RESOLUTION, catalogue, find};
 pub use noise::add_noise;
 

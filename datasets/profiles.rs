@@ -4,9 +4,11 @@ use medial::Vec3;
 use medial::geometry::glam::DVec2;
 use medial::surface::TriMesh;
 
-use crate::axes::{Profile, Site};
-use crate::shapes::HOLED_HALF;
+use crate::bisectors::{Profile, Site};
 use crate::solids::{between, parts, share, split};
+
+/// Half the sides of the plate with a hole along y.
+pub(crate) const HOLED_HALF: Vec3 = Vec3::new(1.2, 0.15, 0.9);
 
 // Medial axes. Each head names the junctions: the points with three nearest sites.
 

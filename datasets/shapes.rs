@@ -6,10 +6,12 @@ use medial::Vec3;
 use medial::surface::TriMesh;
 
 use crate::implicit::{Blend, Ellipsoid, Part, polygonise, slide};
-use crate::profiles::{Elbow, Frustum, Rib, across_elbow, around_hole, flat_triangle, strip};
+use crate::profiles::{
+    Elbow, Frustum, HOLED_HALF, Rib, across_elbow, around_hole, flat_triangle, strip,
+};
 use crate::solids::{
-    Curve, Piece, Ring, SECTORS, boundary, cap, divided, frequency, joined, mapped, mirrored,
-    parts, reversed, rings, surface, torus_grid, unit_sphere,
+    Curve, Piece, Ring, boundary, cap, capsule_of, divided, frequency, joined, mapped, mirrored,
+    parts, reversed, rings, stacks, surface, torus_grid, unit_sphere,
 };
 
 /// Semi-axes of the ellipsoid.
@@ -56,8 +58,7 @@ pub(crate) const FILLETED_ELBOW: Elbow = Elbow { fillet: 0.3, ..BRACKET_ELBOW };
 /// The plate with a rib, and half its width.
 pub(crate) const RIB: Rib = Rib { half: 1.0, plate: 0.3, half_rib: 0.06, height: 1.0 };
 pub(crate) const RIB_HALF: f64 = 0.4;
-/// Half the sides of the plate with a hole along y, and the radius of the hole.
-pub(crate) const HOLED_HALF: Vec3 = Vec3::new(1.2, 0.15, 0.9);
+/// Radius of the hole of the plate with a hole.
 pub(crate) const HOLE: f64 = 0.5;
 /// The frustum.
 pub(crate) const FRUSTUM: Frustum = Frustum { below: 0.8, above: 0.4, half: 1.0 };
@@ -203,23 +204,6 @@ fn coil_frame(along: f64) -> [Vec3; 3] {
     let tangent = Vec3::new(-TAU * radius * sin, TAU * radius * cos, pitch) / speed;
     let normal = Vec3::new(-cos, -sin, 0.0);
     [tangent, normal, tangent.cross(normal)]
-}
-
-/// A cylinder of the given half length and radius with a hemisphere at each end.
-pub(crate) fn capsule_of(half: f64, radius: f64, edge: f64) -> TriMesh {
-    let quarter = std::f64::consts::FRAC_PI_2;
-    let steps = parts(quarter * radius, edge, 2);
-    let top = cap(steps, |t| {
-        let (sin, cos) = (quarter * t).sin_cos();
-        (radius * sin, half + radius * cos)
-    });
-    surface(&mirrored(&top, stacks(half, radius, steps)))
-}
-
-/// Parts of a cylinder as long as the sides of its rings.
-fn stacks(half: f64, radius: f64, cap_steps: u32) -> u32 {
-    let side = TAU * radius / f64::from(SECTORS * cap_steps);
-    parts(2.0 * half, side, 1)
 }
 
 pub(crate) fn rod(edge: f64) -> TriMesh {

@@ -6,8 +6,6 @@ use std::f64::consts::TAU;
 use medial::Vec3;
 use medial::surface::TriMesh;
 
-use crate::shapes::capsule_of;
-
 // Surfaces of unions of grid blocks: everything with flat sides and right angles.
 
 /// Grid coordinates along one axis: the breaks, and even divisions of about `edge` between them.
@@ -426,4 +424,21 @@ pub(crate) fn torus_grid(major: f64, minor: f64, around: u32, across: u32) -> Tr
         }
     }
     mesh
+}
+
+/// A cylinder of the given half length and radius with a hemisphere at each end.
+pub(crate) fn capsule_of(half: f64, radius: f64, edge: f64) -> TriMesh {
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let steps = parts(quarter * radius, edge, 2);
+    let top = cap(steps, |t| {
+        let (sin, cos) = (quarter * t).sin_cos();
+        (radius * sin, half + radius * cos)
+    });
+    surface(&mirrored(&top, stacks(half, radius, steps)))
+}
+
+/// Parts of a cylinder as long as the sides of its rings.
+pub(crate) fn stacks(half: f64, radius: f64, cap_steps: u32) -> u32 {
+    let side = TAU * radius / f64::from(SECTORS * cap_steps);
+    parts(2.0 * half, side, 1)
 }

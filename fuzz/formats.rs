@@ -6,7 +6,7 @@ use medial::complex::{self, LoadedMa, Radii, ReadOptions};
 use medial::surface::{self, Format};
 use medial_bench::plugin;
 use medial_bench::study::Study;
-use medial_reports::parse_records;
+use medial_run::journal::parse_records;
 
 /// Larger meshes are not put to checks that take longer than reading.
 const SMALL: usize = 2000;

@@ -9,14 +9,16 @@
 
 use std::cmp::Ordering;
 
+use medial_run::level::Target;
+use medial_run::record::{Record, Status};
+use medial_run::text::{counted, grouped, significant};
+
 use crate::comparison::{Comparison, Entry, reached};
 use crate::header::Header;
 use crate::metric::{CENTRALITY, COMPLETENESS, HAUSDORFF, MIN_ANGLE, TOTAL_SECONDS, median};
-use crate::record::{Record, Status, Target};
-use crate::statistics::{FEWEST, Pairs};
+use crate::statistics::{FEWEST, Pairs, Sample};
 use crate::summary::{Ratio, reference, topology};
 use crate::tables::{Cell, Column, Table};
-use crate::text::{counted, grouped, significant};
 
 /// The table compares results at the requested count nearest to this one.
 const USUAL: f64 = 100.0;
@@ -47,6 +49,13 @@ pub(crate) type Values = Vec<Option<Found>>;
 pub(crate) struct Found {
     pub(crate) value: f64,
     seconds: f64,
+}
+
+/// The values alone, for tests over meshes.
+pub(crate) fn samples(values: &[Values]) -> Vec<Sample> {
+    let sample =
+        |values: &Values| values.iter().map(|found| found.map(|found| found.value)).collect();
+    values.iter().map(sample).collect()
 }
 
 /// A criterion and its values; less is better.
@@ -324,7 +333,8 @@ pub(crate) fn ranked(values: &[Values]) -> Vec<Rank> {
 fn rows_of(comparison: &Comparison<'_>, criterion: &Criterion) -> Vec<Vec<Cell>> {
     let mut ranks = ranked(&criterion.values);
     let Some(first) = ranks.first().map(|rank| rank.series) else { return vec![] };
-    let pairs = Pairs::of(ranks.iter().map(|rank| rank.series).collect(), &criterion.values);
+    let pairs =
+        Pairs::of(ranks.iter().map(|rank| rank.series).collect(), &samples(&criterion.values));
     let mut rows = vec![row_of(comparison, criterion, criterion.title.clone(), &ranks, &pairs)];
     ranks.sort_by(by_meshes);
     if ranks[0].series != first {
@@ -394,7 +404,7 @@ fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) ->
         cells.extend([(); 6].map(|()| Cell::optional(None)));
         return cells;
     }
-    let pairs = Pairs::of(ranks.iter().map(|rank| rank.series).collect(), &errors);
+    let pairs = Pairs::of(ranks.iter().map(|rank| rank.series).collect(), &samples(&errors));
     row_of(comparison, &error_criterion(errors, title.clone()), title, &ranks, &pairs)
 }
 

@@ -3,15 +3,11 @@
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::Target;
+use medial_run::level::Target;
+use medial_run::record::{COUNT_TOLERANCE, Record, Status};
+use medial_run::text::{counted, grouped, printable, trimmed};
 
 use crate::metric::{COMPARED, FROZEN_SECONDS, HAUSDORFF, Metric};
-use crate::record::{Record, Status};
-use crate::text::{counted, grouped, printable, trimmed};
-
-/// Largest relative difference of reached from requested spheres at which results still count as results at the same
-/// number of spheres. Methods that search on a native level cannot hit every count.
-pub const COUNT_TOLERANCE: f64 = 0.02;
 
 /// Every record that counts, by mesh, series and level.
 pub(crate) struct Comparison<'a> {

@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 
 use medial::simplifier::{MethodInfo, ParamInfo, Presentation};
+use medial_run::record::Machine;
+use medial_run::text::file_stems;
 use serde::{Deserialize, Serialize};
 
-use crate::record::Machine;
+use crate::comparison::Comparison;
 
 /// The head of a report. The runner passes in everything, so that equal records and headers give equal bytes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -180,4 +182,16 @@ impl Header {
         let parts = [version, earlier, date].map(Option::unwrap_or_default).concat();
         format!("Made by medial{parts}{end}")
     }
+}
+
+/// The methods with records and a description, and the file of the page of each.
+pub(crate) fn method_pages<'h>(
+    header: &'h Header,
+    comparison: &Comparison<'_>,
+) -> Vec<(&'h MethodNote, String)> {
+    let mut notes: Vec<&MethodNote> = header.methods.iter().collect();
+    notes.retain(|note| comparison.methods.contains(&note.id.as_str()));
+    let stems = file_stems(notes.iter().map(|note| note.id.as_str()));
+    let files = stems.into_iter().map(|stem| format!("method-{stem}.html"));
+    notes.into_iter().zip(files).collect()
 }

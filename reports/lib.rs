@@ -1,9 +1,7 @@
-//! Result records and reports: tables, plots, the page.
+//! Reports on records: tables, plots, the page.
 //!
 //! | module | holds |
 //! |---|---|
-//! | `record` | [`Record`], one line of `results.jsonl` |
-//! | `journal` | reading and appending those lines |
 //! | [`editions`] | frozen results that others compare against |
 //! | [`diff`] | an older and a newer set of records, and the regressions between them |
 //! | `comparison` | records arranged by mesh, method and level |
@@ -11,11 +9,13 @@
 //! | `summary` | means over meshes at equal numbers of spheres and at native levels |
 //! | `overview` | all methods at one number of spheres: the end of a comparison |
 //! | `answers` | which method for which purpose, at equal counts and equal errors |
-//! | `statistics` | which differences are established: tests over meshes, intervals |
+//! | `statistics` | tests over meshes, intervals of ratios |
+//! | `differences` | which differences between methods are established |
 //! | `tables` | CSV, Markdown, LaTeX |
 //! | `plots` | figures, and their SVG |
 //! | [`history`] | one file for each run, change points over many runs |
 //! | `pictures` | which results are shown next to each other |
+//! | [`drawing`] | one picture by its options |
 //! | [`render`] | pictures of surfaces and medial meshes as PNG |
 //! | `view3d` | geometry of the 3D views |
 //! | `page` | the self-contained `index.html` |
@@ -25,40 +25,30 @@
 mod answers;
 mod comparison;
 pub mod diff;
+mod differences;
+pub mod drawing;
 pub mod editions;
 mod header;
 pub mod history;
-mod journal;
 mod metric;
 mod overview;
 mod page;
 mod pictures;
 mod plots;
-mod record;
 pub mod render;
 mod site;
 mod statistics;
 mod summary;
 mod tables;
-mod text;
 mod view3d;
 mod write;
 
-pub use comparison::COUNT_TOLERANCE;
 pub use header::{Header, MethodNote, RunNote, Running};
-pub use journal::{
-    BadLine, Journal, JournalError, Journaled, parse_records, read_records, write_records,
-};
 pub use metric::{Better, METRICS, Metric, measured_rows};
 pub use overview::{reasons, summary_text};
 pub use pictures::{PictureStrip, picture_strips};
-pub use record::{
-    Conditions, Initial, Machine, OwnSeconds, Record, Repetition, Simplify, Stages, Status, Target,
-    file_inside,
-};
 pub use site::write_site;
 pub use tables::without_markup;
-pub use text::{file_stem, printable, significant};
 pub use view3d::View3d;
 pub use write::{ReportError, read_header, results_csv, write_report};
 

@@ -5,10 +5,9 @@
 //! it. A new metric needs its computation in `medial::metrics` and one entry here.
 
 use medial::metrics::Evaluation;
+use medial_run::record::Record;
+use medial_run::text::{grouped, significant};
 use serde::Serialize;
-
-use crate::record::Record;
-use crate::text::{grouped, significant};
 
 /// The better direction of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

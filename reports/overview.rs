@@ -2,14 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use medial_run::record::Record;
+use medial_run::text::{counted, grouped, printable, shortened};
+
 use crate::answers::{by_bound, equal_error_table, usual_level};
 use crate::comparison::{Comparison, RISING, reached, row_name};
 use crate::header::MethodNote;
 use crate::metric::{FROZEN_SECONDS, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
-use crate::record::Record;
 use crate::summary::{CountSummary, SeriesSummary, by_count};
 use crate::tables::{Cell, Table};
-use crate::text::{counted, grouped, printable, shortened};
 
 /// Longest line of the terminal, in characters.
 const WIDTH: usize = 100;

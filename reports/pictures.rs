@@ -7,12 +7,12 @@
 use std::collections::BTreeMap;
 
 use medial::geometry::hash::splitmix;
+use medial_run::record::{Record, Status};
+use medial_run::text::{file_stems, grouped};
 
 use crate::answers::usual_level;
 use crate::comparison::{Comparison, Entry, reached};
 use crate::metric::HAUSDORFF;
-use crate::record::{Record, Status};
-use crate::text::{file_stems, grouped};
 
 /// Folders of the pictures and of the 3D views, next to the page.
 pub(crate) const FOLDER: &str = "pictures";

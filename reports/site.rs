@@ -6,14 +6,15 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use medial_run::record::{Record, Status};
+use medial_run::text::{escape_html, file_stems, grouped};
+
 use crate::comparison::{Comparison, Entry, reached};
-use crate::header::{Header, MethodNote};
+use crate::differences::against_others;
+use crate::header::{Header, MethodNote, method_pages};
 use crate::metric::{HAUSDORFF, MEAN_ERROR, MIN_ANGLE, TOTAL_SECONDS};
 use crate::pictures::strips;
-use crate::record::{Record, Status};
-use crate::statistics::against_others;
 use crate::tables::{Cell, Table, mesh_table, to_html, topology_word};
-use crate::text::{escape_html, file_stems, grouped};
 use crate::write::{Files, ReportError, write_report};
 
 /// Writes the site of some records into a folder: the report without medial meshes, and further pages. Pictures and 3D views
@@ -58,18 +59,6 @@ pub fn write_site(
 }
 
 const SUBMISSIONS: &str = "submissions.html";
-
-/// The methods with records and a description, and the file of the page of each.
-pub(crate) fn method_pages<'h>(
-    header: &'h Header,
-    comparison: &Comparison<'_>,
-) -> Vec<(&'h MethodNote, String)> {
-    let mut notes: Vec<&MethodNote> = header.methods.iter().collect();
-    notes.retain(|note| comparison.methods.contains(&note.id.as_str()));
-    let stems = file_stems(notes.iter().map(|note| note.id.as_str()));
-    let files = stems.into_iter().map(|stem| format!("method-{stem}.html"));
-    notes.into_iter().zip(files).collect()
-}
 
 fn mesh_file(stem: &str) -> String {
     format!("mesh-{stem}.html")

@@ -11,14 +11,10 @@
 //! `scripts/check_statistics.py` computes the same with SciPy.
 
 use medial::geometry::hash::splitmix;
-
-use crate::answers::{Values, errors_at, ranked};
-use crate::comparison::Comparison;
-use crate::tables::{Cell, Table};
-use crate::text::{counted, significant};
+use medial_run::text::significant;
 
 /// Probability of calling any difference of a table established although there is none.
-const LEVEL: f64 = 0.05;
+pub(crate) const LEVEL: f64 = 0.05;
 
 /// Meshes that a test and an interval need: with fewer, no two-sided test reaches [`LEVEL`].
 pub(crate) const FEWEST: usize = 6;
@@ -29,6 +25,9 @@ const MOST_EXACT: usize = 100;
 /// Resampled sets of meshes for an interval, and their seed.
 const RESAMPLES: usize = 2_000;
 const SEED: u64 = 0;
+
+/// For each mesh the value of a method, infinite without a result; `None` where the method did not run.
+pub(crate) type Sample = Vec<Option<f64>>;
 
 /// Two methods on the meshes that both ran on.
 #[derive(Clone, Debug)]
@@ -48,8 +47,8 @@ pub(crate) struct Paired {
 }
 
 impl Paired {
-    fn of(first: &Values, second: &Values) -> Self {
-        let pairs = first.iter().zip(second).filter_map(|(a, b)| Some([(*a)?.value, (*b)?.value]));
+    fn of(first: &Sample, second: &Sample) -> Self {
+        let pairs = first.iter().zip(second).filter_map(|(a, b)| Some([(*a)?, (*b)?]));
         // A mesh without a result of either is left out. A perfect result is zero, which has no logarithm.
         let pairs = pairs.filter(|[a, b]| a.is_finite() || b.is_finite());
         let differences: Vec<f64> = pairs
@@ -93,14 +92,15 @@ impl Paired {
 
 /// All pairs of some methods, with corrected p-values.
 pub(crate) struct Pairs {
-    series: Vec<usize>,
+    /// The series, in the order of the request.
+    pub(crate) series: Vec<usize>,
     /// By rows: the first method with each later one.
-    pairs: Vec<Paired>,
+    pub(crate) pairs: Vec<Paired>,
 }
 
 impl Pairs {
     /// The pairs of some series, with the values of all series.
-    pub(crate) fn of(series: Vec<usize>, values: &[Values]) -> Self {
+    pub(crate) fn of(series: Vec<usize>, values: &[Sample]) -> Self {
         let firsts = series.iter().enumerate();
         let pairs = firsts.flat_map(|(k, &a)| series[k + 1..].iter().map(move |&b| (a, b)));
         let mut pairs: Vec<Paired> =
@@ -121,7 +121,7 @@ impl Pairs {
     }
 
     /// The series that one is not established to differ from.
-    fn alike(&self, a: usize) -> Vec<usize> {
+    pub(crate) fn alike(&self, a: usize) -> Vec<usize> {
         let is_alike = |b: &usize| self.between(a, *b).is_some_and(|pair| !pair.is_established());
         self.series.iter().copied().filter(is_alike).collect()
     }
@@ -209,124 +209,6 @@ fn interval_of_logs(logs: &[f64]) -> Option<[f64; 2]> {
             (low + part * (means[place as usize + 1] - low)).exp()
         })
     })
-}
-
-/// The methods at each number of spheres, the best median error first, with all pairs.
-fn rankings(comparison: &Comparison<'_>) -> Vec<(usize, Pairs)> {
-    let of_count = |(level, spheres)| {
-        let values = errors_at(comparison, level);
-        let series: Vec<usize> = ranked(&values).iter().map(|rank| rank.series).collect();
-        (series.len() > 1).then(|| (spheres, Pairs::of(series, &values)))
-    };
-    comparison.counts().filter_map(of_count).collect()
-}
-
-/// A table for each number of spheres: every method against the first, and those that it is not established to differ from.
-pub(crate) fn difference_tables(comparison: &Comparison<'_>, how: &str) -> Vec<Table> {
-    let name = |series: usize| comparison.series[series].as_str();
-    let mut tables = vec![];
-    for (spheres, pairs) in rankings(comparison) {
-        let first = pairs.series[0];
-        let cell = |series: usize, text: fn(&Paired) -> Option<String>| {
-            Cell::optional(pairs.between(series, first).and_then(|pair| text(&pair)))
-        };
-        let rows = Table::of(&pairs.series)
-            .text("method", |&series| name(series))
-            .text(format!("Hausdorff ÷ {}", name(first)), |&s| cell(s, Paired::ratio_text))
-            .number("n", |&s| cell(s, |pair| Some(pair.meshes().to_string())))
-            .text("better, equal, worse", |&s| {
-                cell(s, |pair| Some(pair.outcomes.map(|count| count.to_string()).join(", ")))
-            })
-            .number("effect", |&s| cell(s, |pair| Some(format!("{:.2}", pair.effect))))
-            .number("p", |&s| cell(s, |pair| Some(p_text(pair.corrected))))
-            .text("not established to differ from", |&series| match &pairs.alike(series)[..] {
-                [] => "–".to_owned(),
-                alike if alike.len() > 1 && alike.len() + 1 == pairs.series.len() => {
-                    "any other".to_owned()
-                }
-                alike => alike.iter().map(|&other| name(other)).collect::<Vec<_>>().join(", "),
-            });
-        let mut notes = vec![how.to_owned(), NOTE.to_owned()];
-        let most = pairs.pairs.iter().map(Paired::meshes).max().unwrap_or(0);
-        let least = pairs.pairs.len() as f64 * 2.0 * 0.5f64.powi(most as i32);
-        if most < FEWEST || least >= LEVEL {
-            let meshes = counted(most, "mesh", "meshes");
-            let pairs = counted(pairs.pairs.len(), "pair", "pairs");
-            notes.push(format!(
-                "With {meshes} and {pairs} of methods, no difference can be established."
-            ));
-        }
-        let caption = format!("Differences at {}", counted(spheres, "sphere", "spheres"));
-        tables.push(Table { caption, notes, ..rows.table });
-    }
-    tables
-}
-
-/// A table for each number of spheres: one method against each other one. Empty where it has no median.
-pub(crate) fn against_others(comparison: &Comparison<'_>, series: usize) -> Vec<Table> {
-    let mut tables = vec![];
-    for (spheres, pairs) in rankings(comparison) {
-        let others =
-            pairs.series.iter().filter_map(|&other| Some((other, pairs.between(series, other)?)));
-        let others: Vec<(usize, Paired)> = others.collect();
-        let rows = Table::of(&others)
-            .text("other method", |(other, _)| comparison.series[*other].as_str())
-            .text("Hausdorff ÷ its", |(_, pair)| Cell::optional(pair.ratio_text()))
-            .number("n", |(_, pair)| pair.meshes().to_string())
-            .text("better, equal, worse", |(_, pair)| {
-                pair.outcomes.map(|n| n.to_string()).join(", ")
-            })
-            .number("p", |(_, pair)| p_text(pair.corrected))
-            .text("established", |(_, pair)| if pair.is_established() { "yes" } else { "no" });
-        let caption = format!("Against the others at {}", counted(spheres, "sphere", "spheres"));
-        let notes = vec![NOTE.to_owned()];
-        tables.extend((!others.is_empty()).then_some(Table { caption, notes, ..rows.table }));
-    }
-    tables
-}
-
-const NOTE: &str = "By median Hausdorff error. Ratios are geometric means over the meshes where both have a result, with \
-    95 % intervals from 2,000 resampled sets of meshes, if they are at least six. n: meshes where either has a result; a \
-    missing one, or an error above 5 %, counts as infinite. Effect: from -1, worse on all meshes, to 1. p: two-sided \
-    Wilcoxon signed-rank test, corrected for all pairs of methods by Holm; established: below 0.05 on at least six meshes.";
-
-fn p_text(p: f64) -> String {
-    if p < 1e-4 { "< 0.0001".to_owned() } else { significant(p, 2) }
-}
-
-/// Every pair of methods at every number of spheres with all digits, as CSV.
-pub(crate) fn differences_csv(comparison: &Comparison<'_>) -> Result<Vec<u8>, csv::Error> {
-    let mut writer = csv::Writer::from_writer(vec![]);
-    writer.write_record([
-        "spheres",
-        "method",
-        "other",
-        "better",
-        "equal",
-        "worse",
-        "ratio",
-        "ratio_low",
-        "ratio_high",
-        "effect",
-        "p",
-        "p_corrected",
-    ])?;
-    for (spheres, pairs) in rankings(comparison) {
-        let names = pairs.series.iter().enumerate();
-        let names = names.flat_map(|(k, &a)| pairs.series[k + 1..].iter().map(move |&b| [a, b]));
-        for (pair, names) in pairs.pairs.iter().zip(names) {
-            let known =
-                |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
-            let mut row = vec![spheres.to_string()];
-            row.extend(names.map(|series| comparison.series[series].clone()));
-            row.extend(pair.outcomes.map(|count| count.to_string()));
-            row.push(known(pair.ratio));
-            row.extend([0, 1].map(|end| known(pair.interval.map(|ends| ends[end]))));
-            row.extend([pair.effect, pair.p, pair.corrected].map(|value| value.to_string()));
-            writer.write_record(row)?;
-        }
-    }
-    writer.into_inner().map_err(|error| error.into_error().into())
 }
 
 #[cfg(test)]

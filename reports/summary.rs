@@ -11,15 +11,17 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use medial_run::level::Target;
+use medial_run::record::{Record, Status};
+use medial_run::text::{counted, grouped, significant, trimmed};
+
 use crate::comparison::{Comparison, Entry, RISING, level_label, reached};
 use crate::header::Header;
 use crate::metric::{
     COMPLETENESS, GEOMETRIC, HAUSDORFF, LARGER_SIDE, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS,
 };
-use crate::record::{Record, Status, Target};
 use crate::statistics::interval;
 use crate::tables::{Cell, Table};
-use crate::text::{counted, grouped, significant, trimmed};
 
 /// The method that others are put in relation to, where it ran with its defaults.
 const REFERENCE: &str = "qmat";

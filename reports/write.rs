@@ -8,20 +8,20 @@ use std::path::{Path, PathBuf};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use medial::{parser_message, read_regular};
+use medial_run::journal::replace_file;
+use medial_run::record::Record;
+use medial_run::text::file_stems;
 
 use crate::answers::{by_bound, equal_error_table, purpose_table};
 use crate::comparison::Comparison;
+use crate::differences::{difference_tables, differences_csv};
 use crate::header::Header;
-use crate::journal::replace_file;
 use crate::overview::overview_table;
 use crate::page::{MeshPart, MeshView, Page, gzip};
 use crate::pictures::{FOLDER, PictureStrip, VIEWS, strips};
 use crate::plots::{Figure, mean_figures, mesh_figures, profile_figures, profiles_csv};
-use crate::record::Record;
-use crate::statistics::{difference_tables, differences_csv};
 use crate::summary::{MEANS, by_count, means_table, native_curves, native_table};
 use crate::tables::{Table, mesh_table, to_csv, to_latex, to_markdown, topic_tables};
-use crate::text::file_stems;
 use crate::view3d::text_of;
 
 /// Writes the report of some records into a folder, which is created where it is missing:

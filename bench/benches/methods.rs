@@ -12,7 +12,7 @@ use criterion::{BatchSize, BenchmarkId, Criterion, SamplingMode, criterion_group
 use medial::complex::collapse::Hierarchy;
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, MedialSimplifier, Params, Registered, RunContext};
-use medial_bench::study::source::{Input, Source};
+use medial_run::input::{Input, Source};
 
 /// Requested number of spheres.
 const SPHERES: usize = 100;

@@ -10,7 +10,7 @@ use medial::metrics::{JudgeOptions, VolumeOptions, spikes, triangle_quality, vol
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, Params, RunContext};
 use medial::surface::Side;
-use medial_bench::study::source::{Input, Source};
+use medial_run::input::{Input, Source};
 
 /// Surface samples, and about as many of the union: as `medial compare` takes.
 const SAMPLES: usize = 10_000;

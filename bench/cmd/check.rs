@@ -3,6 +3,8 @@
 use std::time::Instant;
 
 use clap::Args;
+use medial_run::item::MethodSpec;
+use medial_run::record::Provenance;
 use serde_json::json;
 
 use crate::args::{self, Global, key_value, positive};
@@ -12,9 +14,8 @@ use crate::exec::{RunError, Supervisor};
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{counted, print_json, print_line};
-use crate::provenance::Provenance;
+use crate::provenance::provenance;
 use crate::study::Study;
-use crate::study::item::MethodSpec;
 use crate::study::registry::{Entry, Registry};
 
 /// Arguments of `check`.
@@ -117,7 +118,7 @@ impl Arguments {
         let timeout = self.timeout.unwrap_or(plain.timeout);
         let study = Study { timeout, memory: self.memory, ..plain };
         study.check()?;
-        let here = Provenance::here();
+        let here = provenance();
         let params = args::params(&self.set);
         let mut items = Vec::new();
         for entry in entries {

@@ -5,23 +5,26 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use medial_reports::{Record, Running, Status, read_header, reasons};
+use clap::builder::TypedValueParser;
+use medial_reports::{Running, read_header, reasons};
+use medial_run::input::Source;
+use medial_run::item::GIVEN;
+use medial_run::item::{Item, Keep};
+use medial_run::record::{Record, Status};
 use serde_json::json;
 
-use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
+use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments, word};
 use crate::exec::queue::{Contender, count, missing, refused_params, run_items};
 use crate::exec::{RunError, Supervisor};
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_line};
-use crate::provenance::Provenance;
+use crate::provenance::provenance;
 use crate::rebuild::{Rebuilt, RunReport, STUDY, of_items, write_study};
 use crate::store::{AXES, PAGE, RESULTS, Store};
 use crate::study::edition::{Edition, Mixed};
-use crate::study::external::{ExternalResult, GIVEN};
-use crate::study::item::{Item, Keep};
+use crate::study::external::ExternalResult;
 use crate::study::registry::Registry;
-use crate::study::source::Source;
 use crate::study::{Study, StudyMethod, shard};
 
 /// Arguments of `compare`.
@@ -105,9 +108,8 @@ pub struct Arguments {
     /// Stop an item that uses more than MB megabytes [default: 3/4 of the machine's memory, divided by the jobs].
     #[arg(long, value_name = "MB")]
     memory: Option<u64>,
-    /// Write results as `.ma`: `all`, `none`, or `small`, which omits native levels of more than
-    /// 1,000 spheres [default: small].
-    #[arg(long, value_enum, value_name = "WHICH", hide_possible_values = true)]
+    /// Write results as `.ma` [default: small].
+    #[arg(long, value_name = "WHICH", value_parser = keep())]
     keep: Option<Keep>,
     /// Certify each Hausdorff error by an interval of this width, as a fraction of the diagonal.
     #[arg(long, value_name = "WIDTH")]
@@ -119,6 +121,14 @@ pub struct Arguments {
     substrate: SubstrateArguments,
     #[command(flatten)]
     measure: MeasureArguments,
+}
+
+fn keep() -> impl TypedValueParser<Value = Keep> {
+    word(&[
+        ("all", "All results"),
+        ("small", "All but native levels of more than 1,000 spheres"),
+        ("none", "No results, and therefore no pictures"),
+    ])
 }
 
 /// Runs the verb.
@@ -137,7 +147,7 @@ pub fn run(
     }
     registry.remarks.iter().for_each(|remark| note(global, remark));
     arguments.apply_to_methods(&mut study, registry)?;
-    let provenance = Provenance::here();
+    let provenance = provenance();
     let mut items = study.items(registry, &provenance)?;
     study.external_remarks()?.iter().for_each(|remark| note(global, remark));
     let edition = Edition::of(&study)?;

@@ -8,15 +8,13 @@ use medial::geometry::trees::Bounds;
 use medial::shape::{Shape, ShapeOptions};
 use medial::surface::SignedDistance;
 use medial::{complex, surface};
+use medial_run::axis::{AxisOptions, extension, is_medial, read_axis};
 use serde_json::json;
 
 use crate::args::{Global, MeshArgument};
 use crate::exit::{Exit, Failure};
-use crate::files::{
-    SURFACES, check_apart, check_extension, extension, is_medial, left_out, open_regular, shape_of,
-};
+use crate::files::{SURFACES, check_apart, check_extension, left_out, open_regular, shape_of};
 use crate::output::{counted, print_json, print_line};
-use crate::study::external::{AxisOptions, read_axis};
 
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
@@ -48,7 +46,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         Some(&arguments.to),
         [from.as_path()].into_iter().chain(arguments.look.mesh.as_deref()),
     )?;
-    let (notes, vertices, faces) = if is_medial(from)? {
+    let (notes, vertices, faces) = if is_medial(from).map_err(|error| Failure::at(from, error))? {
         arguments.look.check(&arguments.to)?;
         let Arguments { lenient, block, .. } = *arguments;
         let options = AxisOptions { lenient, block, ..AxisOptions::default() };

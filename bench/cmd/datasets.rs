@@ -8,13 +8,13 @@ use clap::{Args, Subcommand};
 use medial::surface;
 use medial_datasets::published;
 use medial_datasets::published::{Published, Set};
+use medial_run::input::{Input, Source};
+use medial_run::library::{Library, State};
 use serde_json::{Value, json};
 
 use crate::args::{Global, positive};
 use crate::exit::{Exit, Failure};
 use crate::output::{print_json, print_line};
-use crate::study::library::{Library, State};
-use crate::study::source::{Input, Source};
 
 /// Arguments of `datasets`.
 #[derive(Debug, Args)]

@@ -6,8 +6,9 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use medial_reports::Record;
 use medial_reports::diff::{Diff, DiffOptions, Meaning};
+use medial_run::item::Item;
+use medial_run::record::Record;
 
 use crate::args::{Global, share};
 use crate::exec::queue::{Build, Contender, run_items};
@@ -16,11 +17,10 @@ use crate::exit::{Exit, Failure};
 use crate::files;
 use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_markdown};
-use crate::provenance::Provenance;
+use crate::provenance::provenance;
 use crate::rebuild::records;
 use crate::store::{AXES, RESULTS, Store, claim, is_store, listed};
 use crate::study::Study;
-use crate::study::item::Item;
 use crate::study::registry::Registry;
 
 /// Arguments of `diff`.
@@ -129,7 +129,7 @@ fn alternate(
         registry.add_plugins(&study.resolved(file)).map_err(Failure::usage)?;
     }
     registry.remarks.iter().for_each(|remark| note(global, remark));
-    let here = Provenance::here();
+    let here = provenance();
     let items = study.items(registry, &here)?;
     let folders = ["old", "new"].map(|side| arguments.out.join(side));
     let entries: Vec<_> = listed(&arguments.out).collect();

@@ -3,20 +3,22 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use medial::complex::{LoadedMa, MedialMesh};
-use medial::metrics::{Evaluation, Judge, MetricError, Witness, WitnessSide, sheet_difference};
-use medial::shape::{Fit, Shape, ShapeOptions};
-use medial_reports::{measured_rows, significant};
+use medial::complex::LoadedMa;
+use medial::metrics::{Evaluation, MetricError, Witness, WitnessSide};
+use medial::shape::{Fit, ShapeOptions};
+use medial_reports::measured_rows;
+use medial_run::axis::read_axis;
+use medial_run::evaluate::Evaluator;
+use medial_run::text::significant;
 use serde::Serialize;
 use serde_json::json;
 
-use crate::args::{Global, MeasureArguments, MeshArgument};
+use crate::args::{AxisArguments, Global, MeasureArguments, MeshArgument};
 use crate::exit::{Exit, Failure};
 use crate::files::shape_of;
 use crate::output::{counted, note, print_error, print_json, print_line};
 use crate::progress::StageLine;
 use crate::study::edition::Edition;
-use crate::study::external::{AxisOptions, read_axis};
 use crate::study::registry::Registry;
 
 /// Arguments of `evaluate`.
@@ -30,7 +32,7 @@ pub struct Arguments {
     #[arg(required = true, value_name = "X.ma")]
     axes: Vec<PathBuf>,
     #[command(flatten)]
-    fitting: AxisOptions,
+    fitting: AxisArguments,
     /// Set the seed of the samples.
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -72,11 +74,17 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         .judge(input.axis.as_ref(), options)
         .map_err(|error| Failure::at(&arguments.mesh, error))?;
     let reference = match &arguments.reference {
-        Some(path) => Some(normalised(&read_axis(path, &shape, arguments.fitting)?.0.mesh, &shape)),
+        Some(path) => Some(read_axis(path, &shape, arguments.fitting.into())?.0.mesh),
         None => None,
     };
-    let surface = (&shape, &judge, reference.as_ref());
-    let rows = arguments.axes.iter().map(|path| evaluate(path, arguments, surface, &line));
+    let evaluator = Evaluator {
+        shape: &shape,
+        judge: &judge,
+        certify: arguments.certify,
+        spheres_alone: arguments.spheres_alone,
+        reference: reference.as_ref(),
+    };
+    let rows = arguments.axes.iter().map(|path| evaluate(path, arguments, &evaluator, &line));
     let mut rows: Vec<_> = rows.collect();
     drop(line);
     for row in rows.iter_mut().flatten() {
@@ -131,7 +139,7 @@ struct Evaluated {
 fn evaluate(
     path: &Path,
     arguments: &Arguments,
-    (shape, judge, reference): (&Shape, &Judge, Option<&MedialMesh>),
+    evaluator: &Evaluator<'_>,
     line: &StageLine,
 ) -> Result<Evaluated, Failure> {
     let failed = |error: MetricError| match error {
@@ -142,23 +150,10 @@ fn evaluate(
         _ => Failure::at(path, error),
     };
     line.at(format!("measuring {}", path.display()));
-    let (loaded, fit) = read_axis(path, shape, arguments.fitting)?;
+    let (loaded, fit) = read_axis(path, evaluator.shape, arguments.fitting.into())?;
     let LoadedMa { mesh, notes, warnings: defects, .. } = loaded;
-    let mesh = normalised(&mesh, shape);
-    let mesh = if arguments.spheres_alone { mesh.spheres_alone() } else { mesh };
-    let mut evaluation = judge.evaluate_certified(&mesh, arguments.certify).map_err(failed)?;
-    // Points are looked for in the surface file.
-    evaluation.move_witnesses(|point| shape.normalisation().backward(point));
-    if let (Some(reference), Some(structure)) = (reference, &mut evaluation.structure) {
-        structure.known = Some(sheet_difference(&mesh, reference).map_err(failed)?);
-    }
+    let evaluation = evaluator.evaluate(&mesh).map_err(failed)?;
     Ok(Evaluated { evaluation, fit, place: None, notes, defects })
-}
-
-/// A medial mesh in units of the surface's diagonal.
-fn normalised(mesh: &MedialMesh, shape: &Shape) -> MedialMesh {
-    let to_normal = shape.normalisation();
-    mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p))
 }
 
 /// The evaluations next to each other: a row for each metric, a column for each file.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use medial_reports::history::{Findings, Run, read_runs};
-use medial_reports::read_records;
+use medial_run::journal::read_records;
 use serde_json::{json, to_value};
 
 use crate::args::{Global, positive};

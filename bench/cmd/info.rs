@@ -2,12 +2,12 @@
 
 use clap::Args;
 use medial::surface::{self, SurfaceReport};
-use medial_reports::significant;
+use medial_run::input::{Input, Source};
+use medial_run::text::significant;
 
 use crate::args::{Global, MeshArgument};
 use crate::exit::{Exit, Failure};
 use crate::output::{note, print_json, print_line};
-use crate::study::source::{Input, Source};
 
 /// Arguments of `info`.
 #[derive(Debug, Args)]

@@ -8,19 +8,24 @@ use std::time::SystemTime;
 
 use clap::Args;
 use medial::metrics::DEFINITIONS;
-use medial_reports::{Header, Record, Target, editions, read_header, write_records};
+use medial_reports::{Header, editions, read_header};
+use medial_run::hash::hex_digest;
+use medial_run::journal::write_records;
+use medial_run::level::Target;
+use medial_run::record::Record;
+use medial_run::settings::VOLUME_DEPTH;
 use serde_json::json;
 
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::files;
 use crate::output::{print_json, print_line};
-use crate::provenance::{Provenance, hex_digest};
+use crate::provenance::provenance;
 use crate::rebuild::{Rebuilt, STUDY, of_items, rebuild, records, write_site_of, write_study};
 use crate::store::{AXES, PAGE, RESULTS, Store, artifact_path};
 use crate::study::edition::{Description, EditionMesh};
 use crate::study::registry::Registry;
-use crate::study::{Study, VOLUME_DEPTH, unique_names};
+use crate::study::{Study, unique_names};
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]
@@ -216,7 +221,7 @@ fn freeze(dir: &Path, records: &[Record], to: &Path, registry: &Registry) -> Res
     if !is_empty && !to.join("edition.toml").exists() {
         return Err(Failure::at(to, "not empty and no edition (expected a new folder)"));
     }
-    let here = Provenance::here();
+    let here = provenance();
     let study = Study::read(&dir.join(STUDY))?;
     let items = study.items(registry, &here)?;
     let mut frozen = of_items(records.to_vec(), &items);

@@ -7,13 +7,13 @@ use medial::Vec3;
 use medial::complex::{self, MedialMesh};
 use medial::surface::TriMesh;
 use medial_reports::View3d;
+use medial_run::input::{Input, Source};
 use serde_json::json;
 
 use crate::args::{Global, MeshArgument};
 use crate::exit::{Exit, Failure};
 use crate::files::{self, check_extension, check_folder};
 use crate::output::{counted, note, print_json, print_line};
-use crate::study::source::{Input, Source};
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]

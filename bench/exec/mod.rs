@@ -20,17 +20,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
-use medial_reports::{Record, Repetition, Status, Target};
+use medial_run::item::{Item, Limits};
+use medial_run::level::Target;
+use medial_run::outcome::failure_record;
+use medial_run::record::Provenance;
+use medial_run::record::{Record, Repetition, Status};
+use medial_run::scene::SceneSpec;
+use medial_run::timed::Fault;
 
 use crate::check::Outcome;
 use crate::exec::protocol::{CheckItem, Event, PROTOCOL, Request};
 use crate::exec::worker::{Worker, WorkerOptions};
-use crate::measure::answer::Fault;
-use crate::measure::failure_record;
 use crate::process_tree::signal_name;
-use crate::provenance::Provenance;
 use crate::store::{AGAIN, StoreError};
-use crate::study::item::{Item, Limits, SceneSpec};
 
 /// The reason for which a list of items stops.
 #[derive(Debug, thiserror::Error)]

@@ -7,13 +7,14 @@ use std::io;
 use std::io::{BufRead, Read, Write};
 use std::path::PathBuf;
 
-use medial_reports::{Record, Repetition, Target};
+use medial_run::item::{Item, Limits, MethodSpec};
+use medial_run::level::Target;
+use medial_run::record::Provenance;
+use medial_run::record::{Record, Repetition};
+use medial_run::timed::Fault;
 use serde::{Deserialize, Serialize};
 
 use crate::check::Outcome;
-use crate::measure::answer::Fault;
-use crate::provenance::Provenance;
-use crate::study::item::{Item, Limits, MethodSpec};
 
 /// The record separator of ASCII, with which no printed text begins.
 const MARK: u8 = 0x1e;
@@ -63,7 +64,7 @@ impl Request {
     pub fn terms(&self) -> (usize, Limits) {
         match self {
             Self::Run { item, .. } | Self::Probe { item } | Self::Again { item } => {
-                (item.threads, item.limits)
+                (item.scene.settings.threads, item.limits)
             }
             Self::Check(item) => (item.threads, item.limits),
         }

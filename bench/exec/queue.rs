@@ -12,14 +12,17 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 use std::{fs, io, thread};
 
-use medial_reports::{Record, Status, reasons};
+use medial_reports::reasons;
+use medial_run::hash::hex_digest;
+use medial_run::item::{Item, MethodSpec};
+use medial_run::outcome::median;
+use medial_run::record::Provenance;
+use medial_run::record::{Record, Status};
 
 use crate::exec::{RunError, Supervisor, merge};
-use crate::measure::median;
 use crate::progress::{Progress, Verbosity};
-use crate::provenance::{Provenance, hex_digest};
+use crate::provenance::provenance;
 use crate::store::{Store, StoreError};
-use crate::study::item::{Item, MethodSpec};
 
 /// The items with the levels that a store lacks, and the number of levels that it has.
 pub fn missing(items: &[Item], store: &Store, retry_failed: bool) -> (Vec<Item>, usize) {
@@ -224,7 +227,7 @@ impl Build {
         let provenance = Provenance {
             binary_hash: hex_digest(&bytes),
             version: version.to_owned(),
-            ..Provenance::here()
+            ..provenance()
         };
         Ok(Self { program, provenance })
     }

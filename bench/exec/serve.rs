@@ -16,18 +16,20 @@ use std::{io, thread};
 use medial::complex::MedialMesh;
 use medial::shape::ShapeOptions;
 use medial::simplifier::{Level, MethodInfo, RunContext, SimplifyError};
-use medial_reports::{Record, Status};
+use medial_run::hash::mesh_hash;
+use medial_run::input::{Input, Source};
+use medial_run::item::GIVEN;
+use medial_run::item::{Item, MethodSpec};
+use medial_run::outcome::{failure_record, record, repetition};
+use medial_run::record::Provenance;
+use medial_run::record::{Record, Status};
+use medial_run::scene::{Scene, judge};
+use medial_run::timed::{Bounds, Budget, Fault, LevelRun, answer, panic_message, preparing};
 
 use crate::check::{Outcome, Subject};
 use crate::exec::protocol::{CheckItem, Event, PROTOCOL, Request, send};
-use crate::measure::answer::{Bounds, Budget, Fault, LevelRun, answer, panic_message, preparing};
-use crate::measure::{Scene, failure_record, judge, mesh_hash, record, repetition};
 use crate::plugin::SCRATCH;
-use crate::provenance::Provenance;
-use crate::study::external::GIVEN;
-use crate::study::item::{Item, MethodSpec};
 use crate::study::registry::{Entry, Registry};
-use crate::study::source::{Input, Source};
 use crate::{check, process_tree};
 
 /// Serves requests until standard input ends. `bytes` is the memory limit of this process.

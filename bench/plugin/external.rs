@@ -15,6 +15,10 @@ use medial::simplifier::{
     Simplified, SimplifyError,
 };
 use medial::surface::{self, TriMesh};
+use medial_run::axis::reach;
+use medial_run::hash::hex;
+use medial_run::record::OwnSeconds;
+use medial_run::timed::ProgramPeak;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
@@ -23,7 +27,6 @@ use tempfile::TempDir;
 use super::declaration::{Declaration, LevelKind, OutputUnits, Word};
 use super::program::{self, Ended, NoEnd};
 use crate::process_tree::signal_name;
-use crate::provenance::hex;
 
 /// Environment variable with the folder of temporary folders.
 pub const SCRATCH: &str = "MEDIAL_SCRATCH";
@@ -32,7 +35,7 @@ pub const SCRATCH: &str = "MEDIAL_SCRATCH";
 ///
 /// [`MedialSimplifier::prepare`] writes the files that the program reads, and each level is a run of
 /// the program. So the program repeats its preparation for each level, and its time counts each time.
-/// A program can report the parts as [`OwnSeconds`](super::OwnSeconds).
+/// A program can report the parts as [`OwnSeconds`].
 #[derive(Debug)]
 pub struct External {
     info: MethodInfo,
@@ -290,32 +293,6 @@ impl PreparedProgram<'_> {
     }
 }
 
-/// A medial mesh larger than this, in diagonals of the surface, cannot belong to it.
-// Next to its spheres the whole surface is less than a rounding error.
-const LARGEST_SPHERE: f64 = 1e12;
-
-/// The largest extent of a medial mesh, in the units of a shape's input, from the middle of the surface, in diagonals.
-///
-/// # Errors
-/// Names the sphere that is too far away to be measured.
-pub fn reach(mesh: &MedialMesh, shape: &Shape) -> Result<f64, String> {
-    let to_normal = shape.normalisation();
-    let mut reach = 0.0_f64;
-    for (id, sphere) in mesh.spheres.iter().enumerate() {
-        let centre = to_normal.forward(sphere.centre);
-        // The maximum norm overflows later than the length, and is as good for a bound.
-        let size = centre.abs().max_element().max(sphere.radius / to_normal.diagonal);
-        reach = reach.max(size);
-        // An overflow gives a size that is infinite or not a number.
-        if size.is_nan() || size > LARGEST_SPHERE {
-            return Err(format!(
-                "sphere {id}: too far from the surface ({size:.1e} diagonals); check the units and the surface"
-            ));
-        }
-    }
-    Ok(reach)
-}
-
 /// An operation that the system refused, not a fault of the program.
 fn cannot(what: &str, error: impl std::fmt::Display) -> SimplifyError {
     SimplifyError::Failed(format!("cannot {what}: {error}"))
@@ -376,10 +353,6 @@ const UNSUPPORTED: i32 = 65;
 /// Most bytes of an output; larger files are refused unread.
 const LARGEST_OUTPUT: u64 = 1_000_000_000;
 
-/// Most resident bytes of a program and its descendants together, at the times of sampling.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ProgramPeak(pub u64);
-
 /// Returns an error for every exit code but 0.
 fn check_status(id: &str, status: ExitStatus, stderr: &str) -> Result<(), SimplifyError> {
     let message = last_line(stderr);
@@ -411,16 +384,6 @@ fn check_status(id: &str, status: ExitStatus, stderr: &str) -> Result<(), Simpli
 const MOST_WARNINGS: usize = 50;
 /// Most characters of a warning.
 const LONGEST_WARNING: usize = 1000;
-
-/// Seconds that a program measured by itself.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
-#[serde(default)]
-pub struct OwnSeconds {
-    /// Work that does not depend on the level.
-    pub prepare: Option<f64>,
-    /// The rest.
-    pub simplify: Option<f64>,
-}
 
 /// The report of a program about its run.
 #[derive(Debug, Default, PartialEq, Deserialize)]

@@ -24,8 +24,7 @@ use std::path::Path;
 
 use medial::simplifier::Registered;
 use medial::{read_regular, read_regular_text};
-
-use crate::provenance::hex_digest;
+use medial_run::hash::hex_digest;
 
 mod declaration;
 mod external;
@@ -33,7 +32,7 @@ mod program;
 
 pub use declaration::PluginError;
 pub(crate) use declaration::{is_id, line_of};
-pub use external::{External, OwnSeconds, ProgramPeak, SCRATCH, reach};
+pub use external::{External, SCRATCH};
 pub(crate) use program::Drain;
 
 /// Reads and checks a file of plug-ins: its methods, in its order.

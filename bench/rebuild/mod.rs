@@ -5,22 +5,22 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use jiff::tz::TimeZone;
-use medial_reports::{
-    Header, MethodNote, Record, RunNote, Running, Status, read_header, read_records, write_report,
-    write_site,
-};
+use medial_reports::{Header, MethodNote, RunNote, Running, read_header, write_report, write_site};
+use medial_run::input::Source;
+use medial_run::item::GIVEN;
+use medial_run::item::Item;
+use medial_run::journal::read_records;
+use medial_run::record::Provenance;
+use medial_run::record::{Record, Status};
 use serde_json::json;
 
 use crate::exit::{Exit, Failure};
 use crate::files;
-use crate::provenance::Provenance;
+use crate::provenance::provenance;
 use crate::store::{PAGE, RESULTS};
 use crate::study::Study;
 use crate::study::edition::Edition;
-use crate::study::external::GIVEN;
-use crate::study::item::Item;
 use crate::study::registry::Registry;
-use crate::study::source::Source;
 
 mod pictures;
 
@@ -89,7 +89,7 @@ pub fn write_site_of(dir: &Path, site: &Path, registry: &Registry) -> Result<Reb
 fn items_of(dir: &Path, registry: &Registry) -> Vec<Item> {
     // If meshes or plug-ins of the study are missing, the records stay in their order.
     Study::read(&dir.join(STUDY))
-        .and_then(|study| study.items(registry, &Provenance::here()))
+        .and_then(|study| study.items(registry, &provenance()))
         .unwrap_or_default()
 }
 

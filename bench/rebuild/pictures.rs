@@ -6,10 +6,10 @@ use std::path::Path;
 use medial::complex::MedialMesh;
 use medial::write_atomically;
 use medial_reports::render::{Background, Camera, ColourBy, Errors, Panel, Strip, strip};
-use medial_reports::{PictureStrip, Record, View3d, file_inside, picture_strips};
+use medial_reports::{PictureStrip, View3d, picture_strips};
+use medial_run::input::{Input, Source};
+use medial_run::record::{Record, file_inside};
 use rayon::prelude::*;
-
-use crate::study::source::{Input, Source};
 
 /// Pixels of a panel, and panels in a row: a page of usual width shows them at about their size.
 const PANEL: [usize; 2] = [236, 192];

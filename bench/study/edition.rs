@@ -7,19 +7,23 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use medial::complex::DualTriangulation;
 use medial::metrics::{DEFINITIONS, Evaluation, JudgeOptions};
 use medial::read_regular;
 use medial::surface::Sampling;
 use medial_reports::editions::{DESCRIPTION, EDITIONS, Embedded, RECORDS, unpack};
-use medial_reports::{COUNT_TOLERANCE, Record, Target, significant};
+use medial_run::hash::hex_digest;
+use medial_run::item::Item;
+use medial_run::level::Target;
+use medial_run::record::{COUNT_TOLERANCE, Record};
+use medial_run::settings::VOLUME_DEPTH;
+use medial_run::text::did_you_mean;
+use medial_run::text::significant;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::provenance::hex_digest;
-use crate::study::item::{Dual, Item};
 use crate::study::registry::{INITIAL, Registry};
-use crate::study::source::did_you_mean;
-use crate::study::{Study, VOLUME_DEPTH, parse_toml};
+use crate::study::{Study, parse_toml};
 
 /// The description of an edition: `edition.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,7 +44,7 @@ pub struct Description {
     /// Boundary samples of the start of all methods.
     pub sampling: Sampling,
     /// Triangulation of the dual Voronoi polygons.
-    pub dual: Dual,
+    pub dual: DualTriangulation,
     /// Width of the certified intervals, a fraction of the diagonal.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certify: Option<f64>,

@@ -5,30 +5,28 @@
 //! `method.toml` with the claims of its authors. Folders come from others: links that lead out of them are refused.
 //! A surface instead of a medial mesh is the decimation baseline. Everything but the claimed seconds is measured here.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use clap::{Args, ValueEnum};
-use medial::complex::{LoadedMa, MedialMesh, Radii, ReadOptions, Sphere};
-use medial::shape::{Fit, Shape, ShapeError};
+use medial::shape::Shape;
 use medial::simplifier::{
     Level, Method, MethodInfo, ParamFields, Params, RunContext, Simplification, Simplified,
     SimplifyError,
 };
-use medial::surface::Side;
-use medial::{complex, quoted, read_regular, read_regular_text, shortened, surface};
-use medial_reports::{COUNT_TOLERANCE, Target, significant};
+use medial::{complex, quoted, read_regular, read_regular_text, shortened};
+use medial_run::axis::{
+    AxisOptions, FitBy, RadiiFrom, check_size, content, read_axis, read_external,
+};
+use medial_run::hash::hex_digest;
+use medial_run::item::{GIVEN, Item, MethodSpec};
+use medial_run::level::Target;
+use medial_run::record::{COUNT_TOLERANCE, OwnSeconds, Provenance};
+use medial_run::scene::SceneSpec;
 use serde::{Deserialize, Serialize};
 
-use crate::plugin::{OwnSeconds, reach};
-use crate::provenance::{Provenance, hex_digest};
-use crate::study::item::{Item, MethodSpec, SceneSpec};
 use crate::study::{Study, StudyError, parse_toml};
-
-/// Id of the pseudo-method.
-pub const GIVEN: &str = "given";
 
 /// An external result with its name in tables.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -128,10 +126,9 @@ impl Claims {
 
 /// Name of the file with [`Claims`].
 const CLAIMS: &str = "method.toml";
-/// Most bytes of it, of a result in its folder, and of one that is named by itself; larger files are refused unread.
+/// Most bytes of it, and of a result in its folder; larger files are refused unread.
 const LARGEST_CLAIMS: u64 = 100_000;
 const LARGEST_IN_FOLDER: u64 = 4_000_000;
-const LARGEST_RESULT: u64 = 200_000_000;
 /// Extensions of surfaces that are external results, besides those of medial meshes.
 const SURFACES: [&str; 2] = ["off", "stl"];
 
@@ -509,288 +506,9 @@ fn mesh_of(given: &ExternalResult, meshes: &[String]) -> Result<String, StudyErr
     Err(StudyError::Value(message))
 }
 
-/// Plausible extents of a medial mesh from the middle of its surface, in diagonals.
-const SMALLEST: f64 = 0.01;
-const LARGEST: f64 = 5.0;
-
-/// Medians of the difference between radii and distances to the surface, as fractions of the diagonal: above the first,
-/// other units are tried, and above the second, a misfit gives a warning even if no units fit.
-const DOUBTFUL: f64 = 0.01;
-const WRONG: f64 = 0.05;
-
-/// A radius below this fraction of the diagonal is that of a point on the surface.
-const ON_SURFACE: f64 = 1e-9;
-
-/// Options of reading a medial mesh and fitting it to its surface.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Args)]
-#[serde(default, deny_unknown_fields)]
-pub struct AxisOptions {
-    /// Read all lines of a medial mesh whose header states a different number.
-    #[arg(long)]
-    pub lenient: bool,
-    /// Read the K-th medial mesh, or link of a robot, of a file that holds several, counted from 1.
-    #[arg(long, value_name = "K")]
-    pub block: Option<usize>,
-    /// Read radii from the file, or compute them where it has none or other numbers instead.
-    #[arg(long, value_enum, default_value_t)]
-    pub radii: RadiiFrom,
-    /// Convert the units of the medial mesh to those of the surface, and print the scale and shift.
-    #[arg(long, value_enum, default_value_t)]
-    pub fit: FitBy,
-}
-
-impl AxisOptions {
-    /// The options of the reader of medial meshes.
-    pub fn read_options(self) -> ReadOptions {
-        let radii = match self.radii {
-            RadiiFrom::File => Radii::Needed,
-            RadiiFrom::Surface => Radii::NotNeeded,
-        };
-        ReadOptions { lenient: self.lenient, block: self.block, radii }
-    }
-}
-
-/// Origin of radii.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum RadiiFrom {
-    /// From the file.
-    #[default]
-    File,
-    /// The distance of each centre to the surface.
-    Surface,
-}
-
-/// Conversion of units.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum FitBy {
-    /// The file is in the units of the surface.
-    #[default]
-    None,
-    /// Apply the uniform scale and the shift that fit the spheres to the surface.
-    Similarity,
-    /// As `similarity`, for files that fit only after scaling.
-    Auto,
-}
-
-/// The reason for which a file has no medial mesh for a surface, with its name.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct AxisError(String);
-
-/// Reads a medial mesh of a shape in input units, and the requested change of units.
-///
-/// # Errors
-/// When it cannot be read, has no sphere, or cannot belong to the shape.
-pub fn read_axis(
-    path: &Path,
-    shape: &Shape,
-    options: AxisOptions,
-) -> Result<(LoadedMa, Option<Fit>), AxisError> {
-    let named = |why: &dyn Display| AxisError(format!("{}: {why}", path.display()));
-    let from_surface = options.radii == RadiiFrom::Surface;
-    let bytes = content(path).map_err(AxisError)?;
-    let mut loaded = read_external(path, &bytes, options.read_options()).map_err(AxisError)?;
-    if loaded.mesh.spheres.is_empty() {
-        return Err(named(&"no sphere"));
-    }
-    if from_surface {
-        // The file may have any other numbers in their place.
-        loaded.mesh.spheres.iter_mut().for_each(|sphere| sphere.radius = 0.0);
-    }
-    let reach = reach(&loaded.mesh, shape).map_err(|why| named(&why))?;
-    // Without radii, distances have nothing to compare with: only scales that tools use are tried.
-    let fit = match (options.fit, from_surface) {
-        (FitBy::None, _) => None,
-        (FitBy::Similarity, false) => Some(shape.fit(&loaded.mesh).map_err(|error| named(&error))?),
-        (FitBy::Auto, false) => shape.fit_if_needed(&loaded.mesh).map_err(|error| named(&error))?,
-        (FitBy::Similarity | FitBy::Auto, true) => {
-            let fit = shape.fit_of_points(&loaded.mesh).map_err(|error| named(&error))?;
-            Some(fit.ok_or_else(|| named(&"no fitting units found; give a file with radii"))?)
-        }
-    };
-    if let Some(fit) = &fit {
-        loaded.mesh = fit.similarity.mesh(&loaded.mesh);
-        loaded.notes.push(format!("fitted: {fit}"));
-    }
-    if from_surface {
-        take_radii(&mut loaded, shape).map_err(|why| named(&why))?;
-    } else {
-        let doubts =
-            doubts(&loaded.mesh, shape, fit.is_some(), reach).map_err(|error| named(&error))?;
-        loaded.warnings.extend(doubts.map(|doubt| format!("{}: {doubt}", path.display())));
-    }
-    Ok((loaded, fit))
-}
-
-/// Refuses a file by its size, before it is read.
-fn check_size(path: &Path, most: u64) -> Result<(), String> {
-    let bytes = fs::metadata(path).map_or(0, |file| file.len());
-    let fault = format!("too large (found {bytes} bytes, expected at most {most})");
-    if bytes > most { Err(fault) } else { Ok(()) }
-}
-
-/// The bytes of an external result.
-fn content(path: &Path) -> Result<Vec<u8>, String> {
-    check_size(path, LARGEST_RESULT).map_err(|why| format!("{}: {why}", path.display()))?;
-    surface::content(path).map_err(|error| error.to_string())
-}
-
-/// Reads a medial mesh, or a surface as spheres of radius 0: the union of its slabs is the surface
-/// itself. `bytes` is the content of the file `path`, which is not opened.
-///
-/// # Errors
-/// Names the file.
-fn read_external(path: &Path, bytes: &[u8], options: ReadOptions) -> Result<LoadedMa, String> {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    let is_surface = match extension.as_str() {
-        "off" | "stl" => return read_surface(path, bytes),
-        "ply" => true,
-        // Read as a surface, a medial mesh without radii would have spheres of radius 0.
-        "obj" => !lists_edges(bytes),
-        _ => false,
-    };
-    // First as a medial mesh, because every medial mesh with faces would pass as a surface.
-    let read = complex::read_content(path, bytes, options).map_err(|error| error.to_string());
-    match read {
-        // Without radii it is a surface. If it is neither, the first error is the more useful one.
-        Err(why) if is_surface => read_surface(path, bytes).map_err(|_| why),
-        read => read,
-    }
-}
-
-fn read_surface(path: &Path, bytes: &[u8]) -> Result<LoadedMa, String> {
-    let surface = surface::read_any(path, bytes).map_err(|error| error.to_string())?.mesh;
-    let spheres = surface.vertices.iter().map(|&v| Sphere::new(v, 0.0)).collect();
-    let mesh = MedialMesh::from_simplices(spheres, vec![], surface.faces);
-    let mesh = mesh.map_err(|error| format!("{}: {error}", path.display()))?;
-    let notes = vec!["read a surface as spheres of radius 0".to_owned()];
-    Ok(LoadedMa { mesh, notes, warnings: Vec::new() })
-}
-
-/// Whether the lines `l` of an `.obj` file are the edges of a medial mesh: it has no face, or a line is
-/// the side of a face.
-// In a surface they are edges without a face, which some modellers write.
-fn lists_edges(obj: &[u8]) -> bool {
-    let (mut edges, mut sides) = (HashSet::new(), Vec::new());
-    for line in obj.split(|&byte| byte == b'\n') {
-        let line = String::from_utf8_lossy(line);
-        let mut words = line.split_whitespace();
-        let keyword = words.next();
-        // Texture coordinates and normals follow a slash.
-        let corners = words.map_while(|word| word.split('/').next()?.parse().ok());
-        let corners: Vec<u32> = corners.collect();
-        // Sorted pairs: a side is the same edge in both directions.
-        let pairs = corners.windows(2).map(|pair| [pair[0].min(pair[1]), pair[0].max(pair[1])]);
-        match keyword {
-            Some("l") => edges.extend(pairs),
-            Some("f") => sides.extend(pairs),
-            _ => {}
-        }
-    }
-    !edges.is_empty() && (sides.is_empty() || sides.iter().any(|side| edges.contains(side)))
-}
-
-/// Gives every sphere the distance of its centre to the surface as its radius.
-fn take_radii(loaded: &mut LoadedMa, shape: &Shape) -> Result<(), String> {
-    let units = shape.normalisation();
-    let centres: Vec<_> = loaded.mesh.spheres.iter().map(|sphere| sphere.centre).collect();
-    let radii = shape.distances(&centres).map_err(|error| error.to_string())?;
-    if radii.iter().all(|&radius| radius <= ON_SURFACE * units.diagonal) {
-        return Err(
-            "every point is on the surface; give a medial mesh, not samples of the surface"
-                .to_owned(),
-        );
-    }
-    for (sphere, radius) in loaded.mesh.spheres.iter_mut().zip(radii) {
-        sphere.radius = radius;
-    }
-    loaded.notes.push("computed radii as distances of the centres to the surface".to_owned());
-    let normal: Vec<_> = centres.iter().map(|&centre| units.forward(centre)).collect();
-    // A separate view: its substrates must not be listed as used by a method.
-    let sides = shape.view().inside_test().sides(&normal);
-    let outside = sides.iter().filter(|side| **side == Side::Outside).count();
-    if outside > 0 {
-        let all = centres.len();
-        loaded.warnings.push(format!(
-            "{outside} of {all} centres are outside of the surface; find other units by --fit similarity"
-        ));
-    }
-    Ok(())
-}
-
-/// A warning for a medial mesh that probably does not belong to its surface, or has other units.
-fn doubts(
-    mesh: &MedialMesh,
-    shape: &Shape,
-    is_fitted: bool,
-    reach: f64,
-) -> Result<Option<String>, ShapeError> {
-    // The median: a medial mesh with a few wrong spheres is still of this surface.
-    let misfit = shape.misfit(mesh)?.unwrap_or_default();
-    if misfit <= DOUBTFUL || covers(mesh, shape) {
-        return Ok(None);
-    }
-    let differ = format!(
-        "radii and distances to the surface differ by {} of the diagonal at the median",
-        percent(misfit)
-    );
-    if !is_fitted {
-        let fit = shape.fit(mesh)?;
-        if fit.is_needed {
-            let found = percent(fit.misfit.unwrap_or_default());
-            return Ok(Some(format!(
-                "{differ}, by {found} in other units ({}; {}); convert them by --fit similarity",
-                fit.similarity, fit.source
-            )));
-        }
-        // The middle of the surface is the origin.
-        if !(SMALLEST..=LARGEST).contains(&reach) {
-            return Ok(Some(format!(
-                "reaches {reach:.2e} diagonals from the middle of the surface, and no scale and shift fits; check the \
-                 units and the surface"
-            )));
-        }
-    }
-    Ok((misfit > WRONG)
-        .then(|| format!("{differ}; check the surface, or compute radii by --radii surface")))
-}
-
-/// Whether a mesh is a list of spheres most of whose centres lie in the solid: spheres that cover it are larger than
-/// the distance to its surface in any unit.
-fn covers(mesh: &MedialMesh, shape: &Shape) -> bool {
-    let (units, inside) = (shape.normalisation(), shape.inside_test());
-    let is_within = |s: &&Sphere| inside.winding_number(units.forward(s.centre)) != Some(0);
-    let within = mesh.spheres.iter().filter(is_within);
-    mesh.edges.is_empty() && 2 * within.count() > mesh.spheres.len()
-}
-
-/// A fraction of the diagonal as a percentage with three significant digits.
-pub fn percent(fraction: f64) -> String {
-    format!("{} %", significant(100.0 * fraction, 3))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn an_obj_without_radii_is_a_surface_unless_its_lines_are_sides_of_faces() {
-        let tetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 0 2\n\
-                           f 1/1 3/1 2/1\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
-        for (lines, is_surface) in [("", true), ("l 4 5\n", true), ("l 4 5\nl 3 1\n", false)] {
-            let text = format!("{tetrahedron}{lines}");
-            let read = read_external(Path::new("a.obj"), text.as_bytes(), ReadOptions::default());
-            match read {
-                Ok(loaded) => assert!(is_surface && loaded.mesh.faces.len() == 4, "{lines}"),
-                Err(why) => assert!(!is_surface && why.contains("without radii"), "{why}"),
-            }
-        }
-        let curve = b"v 0 0 0\nv 1 0 0\nl 1 2\n";
-        let why = read_external(Path::new("a.obj"), curve, ReadOptions::default()).unwrap_err();
-        assert!(why.contains("without radii"), "{why}");
-    }
 
     #[test]
     fn a_word_names_the_method_the_mesh_and_the_file() {

@@ -3,37 +3,35 @@
 //! | file | content |
 //! |---|---|
 //! | `mod` | [`Study`], the content of a study file; its items and shards |
-//! | `item` | [`Item`], all that decides a record, and its keys |
-//! | `source` | the origins of meshes |
 //! | `edition` | frozen results to compare against |
-//! | `library` | published meshes by name |
 //! | `external` | results computed elsewhere |
 //! | `registry` | the methods by id |
 
 pub mod edition;
 pub mod external;
-pub mod item;
-pub mod library;
 pub mod registry;
-pub mod source;
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use medial::complex::DualTriangulation;
 use medial::simplifier::Params;
 use medial::surface::{self, Sampling};
 use medial::{parser_message, quoted, read_regular_text, shortened};
-use medial_reports::Target;
+use medial_run::hash::hex_digest;
+use medial_run::input::{Input, InputError, Source};
+use medial_run::item::{Item, Keep, Limits, MethodSpec};
+use medial_run::level::Target;
+use medial_run::record::Provenance;
+use medial_run::scene::{Noise, SceneSpec};
+use medial_run::settings::{Settings, VOLUME_DEPTH};
+use medial_run::text::did_you_mean;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::plugin::line_of;
-use crate::provenance::{Provenance, hex_digest};
 use crate::study::external::ExternalResult;
-use crate::study::item::{Dual, Item, Keep, Limits, Measure, MethodSpec, Noise, SceneSpec};
-use crate::study::library::{Library, PublicError};
 use crate::study::registry::{Entry, INITIAL, Registry};
-use crate::study::source::{Input, InputError, Source, did_you_mean};
 
 /// Default time limit of an item, in seconds.
 const TIMEOUT: f64 = 300.0;
@@ -57,8 +55,6 @@ pub const MOST_THREADS: usize = 1024;
 /// Default number of surface samples of a comparison.
 // Fewer than in `evaluate`, since it measures hundreds of results.
 const SAMPLES: usize = 10_000;
-/// Depth of the octree for the volume difference in a comparison.
-pub const VOLUME_DEPTH: u32 = 5;
 
 /// The matrix of a comparison.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -94,7 +90,7 @@ pub struct Study {
     /// Boundary samples.
     pub sampling: Sampling,
     /// Triangulation of the dual Voronoi polygons.
-    pub dual: Dual,
+    pub dual: DualTriangulation,
     /// Surface samples of the evaluation, in addition to the vertices.
     pub samples: usize,
     /// Width of the certified interval of each Hausdorff error, a fraction of the diagonal; `None` for no certificate.
@@ -187,7 +183,7 @@ impl Default for Study {
             seeds: vec![],
             repeat: 1,
             sampling: Sampling::default(),
-            dual: Dual::default(),
+            dual: DualTriangulation::default(),
             samples: SAMPLES,
             certify: None,
             spheres_alone: false,
@@ -361,9 +357,6 @@ pub enum StudyError {
     /// An input is wrong.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// A set is unknown or not fetched.
-    #[error(transparent)]
-    Library(#[from] PublicError),
 }
 
 /// The message for an unknown method, with the known ids.
@@ -437,10 +430,7 @@ impl Study {
             sources = Source::examples();
         }
         for word in &self.dataset {
-            match word.as_str() {
-                "builtin" => sources.extend(Source::built_ins()),
-                word => sources.extend(Library::here().and_then(|library| library.sources(word))?),
-            }
+            sources.extend(Source::set(word)?);
         }
         sources.iter().try_for_each(Source::check)?;
         // The same mesh twice would be one row with twice the weight.
@@ -472,15 +462,7 @@ impl Study {
                 source: source.clone(),
                 hash: Some(hash),
                 noise: None,
-                sampling: self.sampling,
-                dual: self.dual,
-                measure: Measure {
-                    samples: self.samples,
-                    volume_depth: VOLUME_DEPTH,
-                    seed: self.seed,
-                    certify: self.certify,
-                    spheres_alone: self.spheres_alone,
-                },
+                settings: self.settings(),
             };
             let noisy = self.noise.iter().map(|&eta| {
                 let mesh = noisy(&scene.mesh, eta);
@@ -504,6 +486,19 @@ impl Study {
             items.extend(of_mesh.map(|file| self.external_item(scene.clone(), file, here)));
         }
         Ok(items)
+    }
+
+    fn settings(&self) -> Settings {
+        Settings {
+            sampling: self.sampling,
+            dual: self.dual,
+            samples: self.samples,
+            volume_depth: VOLUME_DEPTH,
+            seed: self.seed,
+            certify: self.certify,
+            spheres_alone: self.spheres_alone,
+            threads: self.threads.unwrap_or_else(rayon::current_num_threads),
+        }
     }
 
     /// The names of all meshes, clean and with noise.
@@ -555,7 +550,6 @@ impl Study {
             levels,
             seed: self.seed,
             repeat: self.repeat,
-            threads: self.threads.unwrap_or_else(rayon::current_num_threads),
             limits: self.limits(here),
             keep: self.keep,
             version,
@@ -652,7 +646,7 @@ fn noisy(mesh: &str, eta: f64) -> String {
 
 /// Names that differ in case alone are one file on some systems.
 fn name_key(name: &str) -> String {
-    medial_reports::file_stem(name).to_ascii_lowercase()
+    medial_run::text::file_stem(name).to_ascii_lowercase()
 }
 
 /// A unique name for each source, also unique as the stem of a file: the file's stem, else its name

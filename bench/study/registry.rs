@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use medial::simplifier::{Chain, Level, MedialSimplifier, MethodInfo, Presentation, Registered};
 use medial_methods::initial;
+use medial_run::hash::hex_digest;
 use serde::{Serialize, Serializer};
 
 use crate::plugin::{self, PluginError, ScriptLoader};
-use crate::provenance::hex_digest;
 
 /// Id of the pseudo-method that returns the initial medial mesh.
 pub const INITIAL: &str = "initial";

@@ -48,7 +48,7 @@ def real(value: Any, what: str, least: float = -math.inf, most: float = math.inf
         number = float(value)
     except (TypeError, ValueError, OverflowError):
         raise ParameterError(f"{what}: expected a number, found {value!r}") from None
-    if number < least or number > most:
+    if math.isnan(number) or number < least or number > most:
         raise ParameterError(f"{what} = {number}: expected {least} to {most}")
     return number
 

@@ -1,4 +1,4 @@
-"""Pictures: PNG without a screen, by the verb `render`; windows and notebooks, by PyVista."""
+"""Pictures: PNG without a screen; windows and notebooks, by PyVista."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _medial
-from ._arguments import Progress, call, need, path_text
+from ._arguments import Progress, call, need, path_text, real, whole
 from .errors import InputError, MedialError, ParameterError
 from .mesh import Mesh
 
@@ -127,17 +127,16 @@ def render(
     options = {
         "show": show,
         "color": color,
-        "camera": camera,
-        "up": up,
-        "zoom": zoom,
-        "size": "x".join(map(str, size)) if isinstance(size, (tuple, list)) else size,
+        "camera": None if camera is None else _word(camera),
+        "up": None if up is None else _word(up),
+        "zoom": real(zoom, "zoom"),
+        "size": [whole(side, "size", 0, 2**32 - 1) for side in size],
         "background": background,
-        "max-error": max_error,
-        "tolerance": tolerance,
+        "max_error": None if max_error is None else real(max_error, "max_error"),
+        "tolerance": real(tolerance, "tolerance"),
     }
-    words = [f"--{key}={_word(value)}" for key, value in options.items() if value is not None]
     layers = [(name, axis._axis) for name, axis in zip(captions, drawn)]
-    png, facts = _medial.render(mesh._surface, layers, words, call(0, threads, progress))
+    png, facts = _medial.render(mesh._surface, layers, json.dumps(options), call(0, threads, progress))
     drawn_as = json.loads(facts)
     direction, up, errors = (tuple(drawn_as[key]) for key in ("direction", "up", "errors"))
     return Picture(png, drawn_as["width"], drawn_as["height"], direction, up, errors)

@@ -4,25 +4,21 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use medial::Vec3;
-use medial::complex::{
-    self, Contacts, DualTriangulation, Look, MedialMesh, MedialUnion, ReadOptions, SphereValues,
-};
+use medial::complex::{self, Contacts, Look, MedialMesh, ReadOptions, SphereValues};
 use medial::geometry::Sphere;
 use medial::metrics::JudgeOptions;
 use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::{Params, RunContext, Simplified};
-use medial::surface::{self, Loaded, Normalisation, SurfaceReport, TriMesh};
-use medial_bench::cmd::reconstruct::fitting_surface;
-use medial_bench::measure::answer::Single;
-use medial_bench::measure::{count_fault, fill_costs, fill_result};
-use medial_reports::{Simplify, Target};
+use medial::simplifier::Params;
+use medial::surface::{self, Loaded, Normalisation, SurfaceReport};
+use medial_run::evaluate::Evaluator;
+use medial_run::level::Target;
+use medial_run::reconstruct::union_boundary;
+use medial_run::simplify::{Output, Request};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use serde_json::{Map, Value, json};
 
-use crate::calls::{
-    Call, Failure, Kind, Monitor, Once, long, of_points, of_rows, points, triangles,
-};
+use crate::calls::{Call, Failure, Kind, Once, long, of_points, of_rows, points, triangles};
 use crate::method::Method;
 use crate::surface::{Surface, shape_options};
 
@@ -153,13 +149,8 @@ impl Axis {
             )),
         };
         let options = self.shape.as_ref().map(Shape::options);
-        let options = options.map(|options| {
-            let dual = match options.dual {
-                DualTriangulation::Fan => "fan",
-                DualTriangulation::Delaunay => "delaunay",
-            };
-            (options.sampling.to_string(), dual.to_owned())
-        });
+        let options =
+            options.map(|options| (options.sampling.to_string(), options.dual.to_string()));
         Ok((contacts, options, self.is_initial))
     }
 
@@ -267,10 +258,24 @@ impl Axis {
             .map_err(|error| Failure::parameter(format!("parameters: {error}")))?;
         let start = self.start()?;
         let home = self.shape.clone();
-        let run = Run { method, params: Params(map), start };
+        let params = Params(map);
         let (simplified, facts) = long(py, &call, move |context, monitor| {
-            let (simplified, facts) = run.at(level, context, monitor)?;
-            let mesh = in_input_units(&simplified.mesh, run.start.normalisation());
+            let judge = JudgeOptions { seed: context.seed, ..JudgeOptions::default() };
+            let request = Request {
+                shape: &start,
+                method: method.get(),
+                sweep: method.sweep(),
+                params: &params,
+                context,
+                judge,
+                certify: false,
+                on_stage: &|stage| monitor.at(stage),
+            };
+            let Output { simplify, result, search } =
+                request.run(level).map_err(Failure::of_fault)?;
+            let mesh = in_input_units(&result.mesh, start.normalisation());
+            let asked = simplify.level.to_string();
+            let facts = json!({ "asked": asked, "simplify": simplify, "max_error": search });
             Ok((mesh, facts.to_string()))
         })?;
         Ok((Self::new(simplified, home), facts))
@@ -290,12 +295,12 @@ impl Axis {
         long(py, &call, move |_, monitor| {
             monitor.at("preparing the surface");
             let shape = model.shape(&ShapeOptions::default())?;
-            let units = *shape.normalisation();
             let judge = model.judge(options)?;
-            let normal = mesh.transformed(1.0 / units.diagonal, |point| units.forward(point));
             monitor.at(if certify.is_some() { "measuring and certifying" } else { "measuring" });
-            let mut evaluation = judge.evaluate_certified(&normal, certify)?;
-            evaluation.move_witnesses(|point| units.backward(point));
+            let (shape, judge) = (&shape, &*judge);
+            let evaluator =
+                Evaluator { shape, judge, certify, spheres_alone: false, reference: None };
+            let evaluation = evaluator.evaluate(&mesh)?;
             serde_json::to_string(&evaluation).map_err(|error| Failure::new(Kind::Internal, error))
         })
     }
@@ -312,13 +317,7 @@ impl Axis {
         let diagonal = self.shape.as_ref().map(|shape| shape.normalisation().diagonal);
         long(py, &call, move |_, monitor| {
             monitor.at("reconstructing");
-            let union = MedialUnion::new(&mesh)?;
-            let (low, high) = union.bounding_box();
-            let corners = TriMesh { vertices: vec![low, high], faces: vec![] };
-            let of_balls = Normalisation::of(&corners).map(|units| units.diagonal);
-            let extent = "the extent of the spheres is zero or not finite";
-            let diagonal = diagonal.or(of_balls).ok_or_else(|| Failure::input(extent))?;
-            let made = fitting_surface(&mesh, &union, diagonal, tolerance)?.made.mesh;
+            let made = union_boundary(&mesh, diagonal, tolerance)?.mesh;
             let (report, problem) = match surface::validate(&made) {
                 Ok(report) => (report, None),
                 // It can still be viewed and written.
@@ -326,51 +325,5 @@ impl Axis {
             };
             Ok((Surface::new(name, Loaded { mesh: made, report }, None), problem))
         })
-    }
-}
-
-/// A method with its parameters and its start.
-struct Run {
-    method: Method,
-    params: Params,
-    start: Shape,
-}
-
-impl Run {
-    /// The result at a level, with its diagnostics.
-    fn at(
-        &self,
-        target: Target,
-        context: &RunContext,
-        monitor: &Monitor,
-    ) -> Result<(Simplified, Value), Failure> {
-        let method = self.method.get();
-        let is_search = target.level().is_err();
-        monitor.at(if is_search { "searching the bound" } else { "simplifying" });
-        let single = Single {
-            shape: &self.start,
-            method,
-            sweep: self.method.sweep(),
-            params: &self.params,
-            context,
-            judge: JudgeOptions { seed: context.seed, ..JudgeOptions::default() },
-            certify: false,
-            on_level: &|_| {},
-        };
-        let (run, search) = single.run(target);
-        let simplified = run.outcome.map_err(Failure::of_fault)?;
-        let fault = count_fault(target, &simplified);
-        let mut record = Simplify {
-            params: self.params.clone(),
-            seed: context.seed,
-            threads: Some(rayon::current_num_threads()),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            ..Simplify::asked(method.info().id.clone(), target, fault.status)
-        };
-        fill_costs(&mut record, &run.times);
-        fill_result(&mut record, &simplified);
-        let asked = run.level.to_string();
-        let facts = json!({ "asked": asked, "simplify": record, "max_error": search });
-        Ok((simplified, facts))
     }
 }

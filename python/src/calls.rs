@@ -18,15 +18,16 @@ use std::thread;
 use std::time::Duration;
 
 use medial::Vec3;
-use medial::complex::{ComplexError, ContourError, MaError, UnionError};
+use medial::complex::{ComplexError, MaError};
 use medial::geometry::triangulation::TriangulationError;
 use medial::metrics::MetricError;
 use medial::shape::ShapeError;
 use medial::simplifier::{Progress, RunContext, SimplifyError};
 use medial::surface::{BvhError, SurfaceError};
-use medial_bench::measure::answer::Fault;
-use medial_bench::study::source::InputError;
-use medial_reports::Status;
+use medial_run::input::InputError;
+use medial_run::reconstruct::ReconstructError;
+use medial_run::record::Status;
+use medial_run::timed::Fault;
 use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
@@ -48,15 +49,15 @@ pub struct Monitor {
 
 #[derive(Default)]
 struct Now {
-    stage: &'static str,
+    stage: String,
     steps: Option<Progress>,
     is_new: bool,
 }
 
 impl Monitor {
     /// Sets the current stage.
-    pub fn at(&self, stage: &'static str) {
-        *self.locked() = Now { stage, steps: None, is_new: true };
+    pub fn at(&self, stage: &str) {
+        *self.locked() = Now { stage: stage.to_owned(), steps: None, is_new: true };
     }
 
     fn steps(&self, steps: Progress) {
@@ -65,14 +66,17 @@ impl Monitor {
     }
 
     /// The stage and its finished share, if either has changed.
-    fn news(&self) -> Option<(&'static str, Option<f64>)> {
+    fn news(&self) -> Option<(String, Option<f64>)> {
         let mut now = self.locked();
         if !std::mem::take(&mut now.is_new) {
             return None;
         }
         // Some stages have no known number of steps.
         let known = now.steps.filter(|steps| steps.total > 0 && steps.total < usize::MAX);
-        Some((now.stage, known.map(|steps| (steps.done as f64 / steps.total as f64).min(1.0))))
+        Some((
+            now.stage.clone(),
+            known.map(|steps| (steps.done as f64 / steps.total as f64).min(1.0)),
+        ))
     }
 
     fn locked(&self) -> std::sync::MutexGuard<'_, Now> {
@@ -277,14 +281,13 @@ macro_rules! about_input {
 about_input!(
     BvhError,
     ComplexError,
-    ContourError,
     InputError,
     MaError,
     MetricError,
+    ReconstructError,
     ShapeError,
     SurfaceError,
-    TriangulationError,
-    UnionError
+    TriangulationError
 );
 
 // Arrays.

@@ -3,16 +3,15 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use medial::complex::MedialMesh;
+use medial::complex::{DualTriangulation, MedialMesh};
 use medial::metrics::{Judge, JudgeOptions};
 use medial::shape::{Shape, ShapeOptions};
 use medial::surface::{
     self, Components, Format, InsideTest, Loaded, MendOptions, Normalisation, Sampling,
     SignedDistance, SurfaceReport, TriMesh, TriangleBvh,
 };
-use medial_bench::study::external::{AxisOptions, read_axis};
-use medial_bench::study::item::Dual;
-use medial_bench::study::source::{Input, Source};
+use medial_run::axis::{AxisOptions, read_axis};
+use medial_run::input::{Input, Source};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
@@ -102,12 +101,12 @@ pub fn shape_options(sampling: &str, dual: &str, seed: u64) -> Result<ShapeOptio
     // A seed in the word itself takes precedence over that of the call.
     let has_seed = sampling.split(':').count() > 2;
     let dual = match dual {
-        "fan" => Dual::Fan,
-        "delaunay" => Dual::Delaunay,
+        "fan" => DualTriangulation::Fan,
+        "delaunay" => DualTriangulation::Delaunay,
         dual => return Err(Failure::parameter(format!("{dual:?}: expected dual fan or delaunay"))),
     };
     let sampling = if has_seed { parsed } else { parsed.with_seed(seed) };
-    Ok(ShapeOptions { sampling, dual: dual.into() })
+    Ok(ShapeOptions { sampling, dual })
 }
 
 #[pymethods]

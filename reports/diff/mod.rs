@@ -14,12 +14,10 @@ mod timing;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use medial_run::record::Record;
+use results::Pairs;
 use serde::Serialize;
 use serde_json::Value;
-
-use crate::record::Record;
-
-use results::Pairs;
 
 pub use timing::Timing;
 

@@ -5,14 +5,14 @@
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
+use medial_run::level::Target;
+use medial_run::record::Record;
+use medial_run::text::printable;
 use serde_json::Value;
 
 use super::{Change, DiffOptions, ItemName, Meaning, Unlike};
-use crate::Target;
 use crate::comparison::{level_label, row_name};
 use crate::metric::METRICS;
-use crate::record::Record;
-use crate::text::printable;
 
 /// Paired and unpaired records of both sets.
 pub(super) struct Pairs<'a> {

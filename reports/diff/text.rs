@@ -2,13 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use medial_run::text::{counted, significant};
 use serde_json::Value;
 
 use super::results::MEMORY;
 use super::{Change, Diff, ItemName, Meaning, Unlike};
 use crate::metric::METRICS;
 use crate::tables::{Cell, Table, escape, left_out, to_markdown};
-use crate::text::{counted, significant};
 
 /// Rows of a table of changes; the JSON has all.
 const MOST_ROWS: usize = 40;

@@ -21,12 +21,12 @@
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 
+use medial_run::record::{Record, Repetition, Stages};
 use serde::Serialize;
 
 use super::results::Pair;
 use super::{DiffOptions, ItemName, Meaning};
 use crate::metric::median;
-use crate::record::{Record, Repetition, Stages};
 
 /// With fewer repetitions seconds are not compared.
 const LEAST_REPETITIONS: usize = 5;

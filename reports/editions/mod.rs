@@ -6,10 +6,11 @@
 use std::io::{self, Read};
 
 use flate2::read::GzDecoder;
+use medial_run::journal::JournalError;
+use medial_run::journal::{Journaled, parse_records, to_line};
+use medial_run::record::Record;
 
-use crate::journal::{Journaled, parse_records, to_line};
 use crate::page::gzip;
-use crate::{JournalError, Record};
 
 /// Name of the description of an edition in its folder.
 pub const DESCRIPTION: &str = "edition.toml";

@@ -1,10 +1,11 @@
 //! The findings as Markdown.
 
+use medial_run::text::{counted, significant};
+
 use super::{DatedChange, Findings};
 use crate::diff::Meaning;
 use crate::diff::text::shown;
 use crate::tables::{Cell, Table, escape, left_out, to_markdown};
-use crate::text::{counted, significant};
 
 /// More rows of one kind are counted, not listed: the JSON has them all.
 const MOST_ROWS: usize = 40;

@@ -9,15 +9,15 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use medial::{parser_message, read_regular_text};
+use medial_run::journal::replace_file;
+use medial_run::record::{Machine, Record, Stages, Status};
+use medial_run::text::printable;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::comparison::row_name;
 use crate::diff::results::{Facts, expected_betti, gates};
-use crate::journal::replace_file;
 use crate::metric::median;
-use crate::record::{Machine, Record, Stages, Status};
-use crate::text::printable;
 
 /// Why a run cannot be stored, or a history cannot be read: the file or option, and its problem.
 #[derive(Debug, thiserror::Error)]

@@ -12,18 +12,17 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use medial_run::record::Machine;
+use medial_run::text::{betti, counted, escape_html, grouped, printable};
 use serde_json::{Value, json};
 
 use crate::answers::usual_level;
 use crate::comparison::{Comparison, level_label};
-use crate::header::{Header, MethodNote, RunNote};
+use crate::header::{Header, MethodNote, RunNote, method_pages};
 use crate::metric::{BELOW_30, COMPARED, EPSILON, Metric, SPHERES_ONLY};
 use crate::pictures::widest_spread;
 use crate::plots::{Figure, symbol};
-use crate::record::Machine;
-use crate::site::method_pages;
 use crate::tables::Table;
-use crate::text::{betti, counted, escape_html, grouped, printable};
 
 /// The content of the page.
 pub(crate) struct Page<'a> {

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use medial_run::level::Target;
+use medial_run::record::Record;
+use medial_run::text::significant;
 use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, Entry, level_label, reached};
-use crate::record::{Record, Target};
 use crate::tables::{Best, flatten, remark, topology_word, warnings};
-use crate::text::significant;
 
 /// A larger table would exhaust a browser's memory.
 pub(super) const MOST: usize = 20_000;
@@ -170,7 +171,7 @@ fn quoted(word: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{Simplify, Status};
+    use medial_run::record::{Simplify, Status};
 
     fn record(level: Target) -> Record {
         let simplify = Simplify::asked("qmat", level, Status::Ok);

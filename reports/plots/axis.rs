@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
+use medial_run::text::{grouped, round_steps, significant};
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
-
-use crate::text::{grouped, round_steps, significant};
 
 /// Width of a letter beneath an axis, with its share of the gap to the next label; of the axis' length.
 const WIDTH_OF_LETTER: f64 = 0.018;

@@ -7,6 +7,7 @@ mod axis;
 mod profiles;
 mod svg;
 
+use medial_run::text::{grouped, significant};
 use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, Entry, reached, rises};
@@ -14,7 +15,6 @@ use crate::metric::{
     COMPLETENESS, HAUSDORFF, LARGER_SIDE, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS,
 };
 use crate::summary::{CountSummary, NativeCurve};
-use crate::text::{grouped, significant};
 
 pub(crate) use self::axis::Scale;
 pub(crate) use self::profiles::{profile_figures, profiles_csv};

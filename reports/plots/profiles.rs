@@ -6,12 +6,13 @@
 //! 2. Empirical distributions over pairs of a mesh and an error target (as in COCO, Hansen et al., 2021): the share of
 //!    pairs that a method reaches within a number of spheres, and within seconds, by any of its results.
 
+use medial_run::record::Record;
+use medial_run::text::counted;
+
 use super::{Curve, Figure, Point, Scale};
 use crate::answers::{Values, errors_at, usual_level, values};
 use crate::comparison::{Comparison, reached};
 use crate::metric::{HAUSDORFF, TOTAL_SECONDS};
-use crate::record::Record;
-use crate::text::counted;
 
 /// Error targets in % of the diagonal.
 const TARGETS: [f64; 8] = [5.0, 3.0, 2.0, 1.0, 0.5, 0.3, 0.2, 0.1];

@@ -7,13 +7,13 @@
 
 use std::error::Error;
 
+use medial_run::text::{printable, shortened};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::axis::{Axis, Scale};
 use super::{Curve, Figure, Point};
-use crate::text::{printable, shortened};
 use crate::write::ReportError;
 
 /// The backend draws at whole pixels: a large drawing keeps circles and slopes smooth at any size.

@@ -8,10 +8,26 @@ use medial::{ColourMap, Vec3, decode_srgb};
 use rayon::prelude::*;
 
 use super::camera::Frame;
-use super::raster::PixelLight;
 
 /// A colour in linear light, 0 to 1.
 pub(super) type Light = [f32; 3];
+
+/// The content of a pixel, as means over its samples.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PixelLight {
+    /// Light of the solid facets, after the glass in front of them.
+    pub(super) solid: Light,
+    /// Share of the pixel that this light comes from.
+    pub(super) solid_share: f32,
+    /// Share of the pixel that is glass.
+    pub(super) glass_share: f32,
+    /// Share that is covered by solid facets.
+    pub(super) covered: f32,
+    /// Depth of the solid facets, in pixels; without meaning where nothing is covered.
+    pub(super) depth: f32,
+    /// Depth of the farthest of them.
+    pub(super) farthest: f32,
+}
 
 /// Steps of the table that turns light into sRGB: fine enough for the darkest of 256 values.
 const ENCODING_STEPS: usize = 8192;

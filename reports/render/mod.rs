@@ -13,6 +13,7 @@ mod camera;
 mod light;
 mod picture;
 mod raster;
+mod scale;
 mod scene;
 mod strip;
 #[cfg(test)]
@@ -21,7 +22,8 @@ mod tests;
 pub use camera::{Camera, Frame};
 pub use medial::ColourMap;
 pub use picture::{Background, Bar, Picture};
-pub use scene::{Layer, Scale, Scene};
+pub use scale::Scale;
+pub use scene::{Layer, Scene};
 pub use strip::{ColourBy, Errors, Panel, Strip, painted, strip};
 
 /// The longest side of a picture, in pixels. Edge functions stay exact up to it.

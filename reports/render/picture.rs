@@ -1,13 +1,14 @@
 //! The picture: pixels, lettering, the colour bar, and the file.
 
+use std::str::FromStr;
 use std::sync::LazyLock;
 
 use fontdue::{Font, FontSettings};
+use medial_run::text::round_steps;
 use png::{BitDepth, ColorType, Compression, Encoder};
 
 use super::RenderError;
-use super::scene::Scale;
-use crate::text::round_steps;
+use super::scale::Scale;
 
 /// The background of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,6 +17,27 @@ pub enum Background {
     Transparent,
     /// An sRGB colour.
     Colour([u8; 3]),
+}
+
+impl FromStr for Background {
+    type Err = &'static str;
+
+    /// The background by name or code.
+    fn from_str(text: &str) -> Result<Self, &'static str> {
+        let found = match text {
+            "white" => Some(Self::WHITE),
+            "black" => Some(Self::Colour([0; 3])),
+            "transparent" => Some(Self::Transparent),
+            _ => text.strip_prefix('#').and_then(|hex| {
+                // The parser also accepts a sign.
+                let is_hex = hex.len() == 6 && hex.bytes().all(|b| b.is_ascii_hexdigit());
+                let code = is_hex.then(|| u32::from_str_radix(hex, 16).ok()).flatten()?;
+                let [_, colour @ ..] = code.to_be_bytes();
+                Some(Self::Colour(colour))
+            }),
+        };
+        found.ok_or("expected white, black, transparent or #rrggbb")
+    }
 }
 
 impl Background {
@@ -278,7 +300,7 @@ impl Bar {
 /// Round values in a range, and the text next to them; the value itself where the range has no extent.
 fn ticks(lo: f64, hi: f64) -> Vec<(f64, String)> {
     if hi <= lo {
-        return vec![(lo, crate::text::significant(lo, 3).replace('-', "−"))];
+        return vec![(lo, medial_run::text::significant(lo, 3).replace('-', "−"))];
     }
     let (step, values) = round_steps(lo, hi, TICKS + 1.0);
     // Decimals that show all digits of a step of 1, 2 or 5 times a power of ten.
@@ -300,7 +322,7 @@ mod tests {
         assert_eq!(words(-2.0, 2.0), "−2 −1 0 1 2");
         assert_eq!(words(0.0, 0.05), "0.00 0.01 0.02 0.03 0.04 0.05");
         assert_eq!(words(3.0, 3.0), "3.00");
-        assert_eq!([0.3, 1.0, 1.2, 7.0].map(crate::text::round_up), [0.5, 1.0, 2.0, 10.0]);
+        assert_eq!([0.3, 1.0, 1.2, 7.0].map(medial_run::text::round_up), [0.5, 1.0, 2.0, 10.0]);
     }
 
     #[test]

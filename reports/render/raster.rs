@@ -13,7 +13,7 @@ use medial::Vec3;
 use rayon::prelude::*;
 
 use super::camera::Frame;
-use super::light::{LINE, Lamp, Light, Paint, glass_opacity, mix};
+use super::light::{LINE, Lamp, Light, Paint, PixelLight, glass_opacity, mix};
 
 /// A triangle with the values that vary along it.
 #[derive(Clone, Copy, Debug)]
@@ -72,23 +72,6 @@ const BAND: usize = 16;
 
 /// No facet.
 const NONE: u32 = u32::MAX;
-
-/// The content of a pixel, as means over its samples.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct PixelLight {
-    /// Light of the solid facets, after the glass in front of them.
-    pub(super) solid: Light,
-    /// Share of the pixel that this light comes from.
-    pub(super) solid_share: f32,
-    /// Share of the pixel that is glass.
-    pub(super) glass_share: f32,
-    /// Share that is covered by solid facets.
-    pub(super) covered: f32,
-    /// Depth of the solid facets, in pixels; without meaning where nothing is covered.
-    pub(super) depth: f32,
-    /// Depth of the farthest of them.
-    pub(super) farthest: f32,
-}
 
 /// Draws batches on a picture of this size: the light of every pixel, row by row.
 pub(super) fn rasterise(batches: Vec<Batch>, frame: &Frame, size: [usize; 2]) -> Vec<PixelLight> {

@@ -1,15 +1,16 @@
 //! The scene: drawable layers, and their facets.
 
+use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::geometry::DisjointSets;
 use medial::surface::{TriMesh, smooth_normals};
-use medial::{ColourMap, Vec3};
 use rayon::prelude::*;
 
 use super::camera::Frame;
-use super::light::{GLASS, Paint, crevices, decode, encode};
+use super::light::{GLASS, Paint, PixelLight, crevices, decode, encode};
 use super::picture::{Background, Picture};
-use super::raster::{Batch, Facet, Kind, Look, PixelLight, rasterise};
+use super::raster::{Batch, Facet, Kind, Look, rasterise};
+use super::scale::Scale;
 use super::{FEWEST_PIXELS, MOST_PIXELS, RenderError};
 
 /// A picture's content, without the camera.
@@ -49,37 +50,6 @@ pub enum Layer<'a> {
         /// The colours of the spheres' radii; without them one colour for sheets and one for curves.
         colour: Option<Scale>,
     },
-}
-
-/// A colour map over a range of values.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scale {
-    /// The value at the low end.
-    pub lo: f64,
-    /// The value at the high end.
-    pub hi: f64,
-    /// The colours.
-    pub map: ColourMap,
-}
-
-impl Scale {
-    /// Radii from the least to the largest of some medial meshes.
-    pub fn radii<'m>(meshes: impl IntoIterator<Item = &'m MedialMesh>) -> Self {
-        let radii = meshes.into_iter().flat_map(|mesh| mesh.spheres.iter().map(|s| s.radius));
-        let (lo, hi) = radii.fold((f64::INFINITY, 0.0), |(lo, hi), r| (r.min(lo), r.max(hi)));
-        Self { lo: lo.min(hi), hi, map: ColourMap::Viridis }
-    }
-
-    /// Errors of either sign up to a largest.
-    pub fn errors(largest: f64) -> Self {
-        Self { lo: -largest, hi: largest, map: ColourMap::Diverging }
-    }
-
-    /// Where a value is, 0 to 1 inside the range; in the middle of a range without extent.
-    fn place(&self, value: f64) -> f32 {
-        let extent = self.hi - self.lo;
-        if extent > 0.0 { ((value - self.lo) / extent) as f32 } else { 0.5 }
-    }
 }
 
 impl Scene<'_> {

@@ -3,22 +3,26 @@
 use medial::ColourMap;
 use medial::complex::{MedialMesh, SheetGraph, SheetOptions};
 use medial::surface::TriMesh;
+use medial_run::text::round_up;
+use serde::Deserialize;
 
 use super::RenderError;
 use super::camera::{Camera, Frame};
 use super::picture::{Background, Bar, LINE, Picture, fitted, letter_size, text_width};
-use super::scene::{Layer, Scale, Scene};
-use crate::text::round_up;
+use super::scale::Scale;
+use super::scene::{Layer, Scene};
 
 /// The colouring of medial meshes, before the scale is known.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ColourBy {
     /// The radii of the spheres.
     #[default]
     Radius,
     /// One colour for sheets, one for curves.
     Plain,
-    /// Sheets in colours of their own, seams black: of meshes whose radii are those of [`painted`].
+    /// Sheets in separate colours, seams black: of meshes whose radii are those of [`painted`].
+    #[serde(skip)]
     Sheets,
 }
 

@@ -6,12 +6,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use medial_run::level::Target;
+use medial_run::record::Record;
+use medial_run::text::printable;
 use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, Entry};
 use crate::metric::{FROZEN_SECONDS, METRICS, Value as Place};
-use crate::record::{Record, Target};
-use crate::text::printable;
 
 /// Columns that every table has, before those of [`METRICS`] and after them. Further ones follow by
 /// name.

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use medial::metrics::Evaluation;
+use medial_run::text::{betti, grouped, printable};
 
 use crate::comparison::{Comparison, Entry, RISING, level_label, reached};
 use crate::metric::{COMPARED, HAUSDORFF, Metric};
 use crate::summary::pick;
 use crate::tables::{Cell, Table};
-use crate::text::{betti, grouped, printable};
 
 /// The values that the bold numbers equal, by level and key of one of [`COMPARED`].
 pub(crate) struct Best(BTreeMap<(usize, &'static str), f64>);
@@ -62,7 +62,9 @@ pub(crate) fn remark(entry: &Entry<'_>) -> String {
     if record.evaluate.is_none() {
         return "not evaluated".to_owned();
     }
-    if let (crate::Target::Spheres(_), false) = (record.simplify.level, entry.comparable()) {
+    if let (medial_run::level::Target::Spheres(_), false) =
+        (record.simplify.level, entry.comparable())
+    {
         return "another number of spheres: not compared".to_owned();
     }
     String::new()

@@ -5,10 +5,9 @@ mod csv;
 mod mesh;
 mod topics;
 
+use medial_run::text::{escape_html, printable};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
-
-use crate::text::{escape_html, printable};
 
 pub(crate) use self::csv::{flatten, to_csv, warnings};
 pub(crate) use self::mesh::{Best, mesh_table, remark, topology_word};

@@ -1,10 +1,11 @@
 //! Tables of further metrics of each method's results at each number of spheres: structure and cover.
 
+use medial_run::text::grouped;
+
 use crate::comparison::{Comparison, Entry};
 use crate::metric::{Better, COVER, Metric, STRUCTURE, median};
 use crate::summary::pick;
 use crate::tables::{Cell, Table};
-use crate::text::grouped;
 
 /// A set of metrics with a table.
 struct Topic {

@@ -16,6 +16,7 @@
 //! Coincident circumcentres are not merged: merging by position can close loops, and the published
 //! counts are those without merging.
 
+use std::fmt;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -44,6 +45,15 @@ pub enum DualTriangulation {
     Fan,
     /// The planar Delaunay triangulation: larger smallest angles.
     Delaunay,
+}
+
+impl fmt::Display for DualTriangulation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Fan => "fan",
+            Self::Delaunay => "delaunay",
+        })
+    }
 }
 
 /// The circumspheres of the finite Delaunay cells, and which are centred inside the surface.

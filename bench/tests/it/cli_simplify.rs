@@ -60,38 +60,6 @@ fn a_wrong_topology_gives_a_warning() {
 }
 
 #[test]
-fn voxels_are_written_as_a_table() {
-    let at = folder();
-    let aof = |more: &[&str]| {
-        json(&[&["simplify", "builtin:plate", "-m", "aof", "--spheres", "200"], more].concat())
-    };
-    let (code, object) = aof(&["--voxels", &at("v.csv")]);
-    assert_eq!(code, 0, "{object}");
-    assert_eq!(object["voxels"]["count"], 200);
-    assert_eq!(object["voxels"]["betti"], serde_json::json!([1, 0, 0]));
-    let text = fs::read_to_string(at("v.csv")).expect("written");
-    let mut lines = text.lines();
-    assert_eq!(lines.next(), Some("x,y,z,distance,flux,i,j,k"));
-    let side = object["voxels"]["side"].as_f64().expect("a length");
-    let mut rows = 0;
-    for line in lines {
-        let row: Vec<f64> = line.split(',').map(|word| word.parse().expect("a number")).collect();
-        for axis in 0..3 {
-            // The centre is half a voxel above the lower corner of its cell.
-            let origin = object["voxels"]["origin"][axis].as_f64().expect("a coordinate");
-            let expected = origin + side * (row[5 + axis] + 0.5);
-            assert!((row[axis] - expected).abs() < 1e-9, "{line}");
-        }
-        rows += 1;
-    }
-    assert_eq!(rows, 200);
-    let (code, object) = aof(&["--voxels", &at("v.txt")]);
-    assert!(code == 1 && object["error"].as_str().is_some_and(|e| e.contains(".csv")), "{object}");
-    let wrong = ["simplify", "builtin:box", "-m", "qmat", "--voxels", &at("v.csv")];
-    refused(&wrong, 2, "no voxels");
-}
-
-#[test]
 fn several_files_give_one_table() {
     let at = folder();
     let (fine, coarse, bad) = (at("fine.ma"), at("coarse.ma"), at("bad.ma"));

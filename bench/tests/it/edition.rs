@@ -4,10 +4,10 @@ use std::fs;
 use std::path::Path;
 
 use medial::metrics::DEFINITIONS;
-use medial_bench::provenance::hex_digest;
 use medial_bench::study::edition::Edition;
-use medial_bench::study::source::{Input, Source};
 use medial_reports::editions::{DESCRIPTION, EDITIONS, RECORDS, pack, unpack};
+use medial_run::hash::hex_digest;
+use medial_run::input::{Input, Source};
 use serde_json::{Value, json};
 
 use crate::command::{done, folder, json, refused, words};

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use medial_bench::study::source::{Input, Source};
+use medial_run::input::{Input, Source};
 use serde_json::{Value, json};
 
 use crate::command::{done, folder, records, run};
@@ -69,7 +69,7 @@ fn the_hash_of_an_input_is_that_of_the_parsed_bytes() {
     let source = Source::File(file.clone().into());
     fs::write(&file, text).expect("written");
     let first = Input::load(&source).expect("a solid");
-    assert_eq!(first.hash, medial_bench::provenance::hex_digest(text.as_bytes()));
+    assert_eq!(first.hash, medial_run::hash::hex_digest(text.as_bytes()));
     fs::write(&file, text.replace("0 0 1\n", "0 0 2\n")).expect("written");
     let second = Input::load(&source).expect("a solid");
     assert_ne!(first.hash, second.hash);

@@ -1,5 +1,5 @@
-//! The crates depend on each other in one direction: `medial-geometry` <- `medial` <- `methods`, `datasets`,
-//! `reports` <- `bench` <- `python`.
+//! The crates depend on each other in one direction: `medial-geometry` <- `medial` <- `methods`,
+//! `datasets` <- `run` <- `reports` <- `bench` <- `python`.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -25,11 +25,18 @@ fn crates_depend_in_one_direction() {
         ("medial", &["medial-geometry"]),
         ("medial-methods", &["medial"]),
         ("medial-datasets", &["medial"]),
-        ("medial-reports", &["medial"]),
-        ("medial-bench", &["medial", "medial-methods", "medial-datasets", "medial-reports"]),
-        ("medial-fuzz", &["medial", "medial-geometry", "medial-reports", "medial-bench"]),
+        ("medial-run", &["medial", "medial-datasets"]),
+        ("medial-reports", &["medial", "medial-run"]),
+        (
+            "medial-bench",
+            &["medial", "medial-methods", "medial-datasets", "medial-run", "medial-reports"],
+        ),
+        ("medial-fuzz", &["medial", "medial-geometry", "medial-run", "medial-bench"]),
         ("medial-oracles", &["medial", "medial-methods", "medial-datasets"]),
-        ("medial-python", &["medial", "medial-methods", "medial-reports", "medial-bench"]),
+        (
+            "medial-python",
+            &["medial", "medial-methods", "medial-run", "medial-reports", "medial-bench"],
+        ),
         ("medial-largest", &["medial", "medial-methods", "medial-bench"]),
     ]);
     assert_eq!(packages.len(), allowed.len(), "every crate has a place in the order");
@@ -82,7 +89,6 @@ const BENCH: Layers<'_> = &[
     &["plugin"],
     &["check"],
     &["study"],
-    &["measure"],
     &["store"],
     &["exec"],
     &["exit"],

@@ -13,7 +13,9 @@ use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeOptions, Substrate};
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
 use medial::surface;
-use medial_bench::plugin::{self, External, OwnSeconds, ProgramPeak, SCRATCH};
+use medial_bench::plugin::{self, External, SCRATCH};
+use medial_run::record::OwnSeconds;
+use medial_run::timed::ProgramPeak;
 use medial_test_support::skip;
 use tempfile::TempDir;
 

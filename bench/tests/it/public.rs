@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use medial::surface;
-use medial_bench::provenance::hex_digest;
+use medial_run::hash::hex_digest;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 

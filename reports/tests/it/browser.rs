@@ -7,12 +7,14 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use super::common::{SHAPES, comparison, header};
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::surface::TriMesh;
-use medial_reports::{Record, View3d, picture_strips, write_report, write_site};
+use medial_reports::{View3d, picture_strips, write_report, write_site};
+use medial_run::record::Record;
 use serde_json::{Value, json};
+
+use super::common::{SHAPES, comparison, header};
 
 const BROWSER: &str = "chromium";
 /// More rows than the document has at first.

@@ -7,10 +7,9 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use flate2::read::GzDecoder;
 use medial::metrics::{Counts, Distances, Evaluation, RatioSpikes, Spikes, TriangleQuality};
-use medial_reports::{
-    Header, Initial, Machine, MethodNote, Record, Repetition, RunNote, Simplify, Stages, Status,
-    Target,
-};
+use medial_reports::{Header, MethodNote, RunNote};
+use medial_run::level::Target;
+use medial_run::record::{Initial, Machine, Record, Repetition, Simplify, Stages, Status};
 use serde_json::Value;
 
 /// The two documents of a page: the plain one, and the packed one with the records.

@@ -1,7 +1,7 @@
 //! The difference of two sets of records: regressions, listed changes, ignored noise.
 
 use medial_reports::diff::{Diff, DiffOptions, Meaning};
-use medial_reports::{Record, Repetition, Stages};
+use medial_run::record::{Record, Repetition, Stages};
 
 use super::common::{self, SHAPES, comparison};
 

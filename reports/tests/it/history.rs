@@ -4,7 +4,8 @@ use std::fs;
 
 use medial_reports::diff::{Diff, DiffOptions, Meaning};
 use medial_reports::history::{Findings, Run, read_runs};
-use medial_reports::{Record, Repetition, Stages, Status, Target};
+use medial_run::level::Target;
+use medial_run::record::{Record, Repetition, Stages, Status};
 
 use super::common::{failed, noise, ok};
 
@@ -102,7 +103,7 @@ fn pipes_are_skipped_without_reading() {
     let (read, damaged) = read_runs(folder.path()).expect("a history");
     assert_eq!((read.len(), damaged.len()), (1, 1));
     assert!(damaged[0].to_string().ends_with("00000000.json: not a regular file"));
-    let error = medial_reports::read_records(&pipe).expect_err("a pipe");
+    let error = medial_run::journal::read_records(&pipe).expect_err("a pipe");
     assert!(error.to_string().ends_with("not a regular file"), "{error}");
 }
 

@@ -2,9 +2,11 @@
 
 use std::fs;
 
-use super::common::{comparison, ok, request};
-use medial_reports::{Journal, JournalError, Status, parse_records, read_records, write_records};
+use medial_run::journal::{Journal, JournalError, parse_records, read_records, write_records};
+use medial_run::record::Status;
 use proptest::prelude::*;
+
+use super::common::{comparison, ok, request};
 
 #[test]
 fn records_read_back_bit_for_bit() {

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use super::common::{SHAPES, comparison, documents, failed, header, ok};
 use medial_reports::{
-    Header, Record, Running, Status, picture_strips, read_header, summary_text, write_report,
-    write_site,
+    Header, Running, picture_strips, read_header, summary_text, write_report, write_site,
 };
+use medial_run::record::{Record, Status};
+
+use super::common::{SHAPES, comparison, documents, failed, header, ok};
 
 const METHODS: [&str; 3] = ["qmat", "angle", "lambda"];
 const COUNTS: [usize; 3] = [500, 200, 100];
@@ -221,7 +222,7 @@ fn missing_values_are_excluded_from_means() {
 
 #[test]
 fn error_bounds_and_native_levels_have_separate_tables() {
-    use medial_reports::Target;
+    use medial_run::level::Target;
 
     let mut records = Vec::new();
     for (shape, mesh) in SHAPES[..4].iter().enumerate() {

@@ -1,4 +1,4 @@
-//! The inputs of a comparison: files of the user, meshes of the library by their names, or built-in shapes.
+//! Surfaces that a user names: files, meshes of the library, built-in shapes.
 
 use std::path::{Component, Path, PathBuf};
 use std::{fmt, fs, io};
@@ -10,8 +10,9 @@ use medial::surface::{SurfaceError, SurfaceReport, TriMesh};
 use medial_datasets::BuiltIn;
 use serde::{Deserialize, Serialize};
 
-use crate::provenance::hex_digest;
-use crate::study::library::{Library, PublicError};
+use crate::hash::hex_digest;
+use crate::library::{Cached, Library, PublicError};
+use crate::text::did_you_mean;
 
 /// Origin of a mesh.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -27,14 +28,7 @@ pub enum Source {
         resolution: Option<u32>,
     },
     /// A mesh of the library.
-    Cached {
-        /// Its name there.
-        name: String,
-        /// The set that it belongs to.
-        set: String,
-        /// Its file.
-        path: PathBuf,
-    },
+    Cached(Cached),
 }
 
 /// Prefix of the names of built-in shapes.
@@ -54,7 +48,7 @@ impl Source {
     /// The file, where it is one.
     pub fn path(&self) -> Option<&Path> {
         match self {
-            Self::File(path) | Self::Cached { path, .. } => Some(path),
+            Self::File(path) | Self::Cached(Cached { path, .. }) => Some(path),
             Self::BuiltIn { .. } => None,
         }
     }
@@ -66,7 +60,7 @@ impl Source {
     /// such mesh.
     pub fn parse(argument: &Path) -> Result<Self, InputError> {
         if let Some(name) = argument.to_str().and_then(|text| text.strip_prefix(DATASET)) {
-            return Ok(Library::here()?.source(name)?);
+            return Ok(Self::Cached(Library::here()?.mesh(name)?));
         }
         let Some(spec) = argument.to_str().and_then(|text| text.strip_prefix(BUILT_IN)) else {
             return Ok(Self::File(argument.to_owned()));
@@ -92,7 +86,7 @@ impl Source {
     /// [`InputError`], which names the input.
     pub fn check(&self) -> Result<(), InputError> {
         match self {
-            Self::File(path) | Self::Cached { path, .. } => {
+            Self::File(path) | Self::Cached(Cached { path, .. }) => {
                 let failed = |error| InputError::Read { path: path.clone(), error };
                 let kind = fs::metadata(path).map_err(failed)?;
                 // Opening a pipe or a device could wait for ever.
@@ -111,7 +105,7 @@ impl Source {
     }
 
     /// The set `builtin`: built-in shapes at their default resolutions, in the order of the catalogue.
-    pub fn built_ins() -> Vec<Self> {
+    fn built_ins() -> Vec<Self> {
         let shapes = medial_datasets::catalogue();
         shapes
             .iter()
@@ -120,13 +114,27 @@ impl Source {
             .collect()
     }
 
+    /// The inputs of a word of `--dataset`: the set `builtin`, a built-in shape, or meshes of the library.
+    ///
+    /// # Errors
+    /// [`InputError::Library`] for an unknown name, or a mesh that was not fetched.
+    pub fn set(word: &str) -> Result<Vec<Self>, InputError> {
+        if word == "builtin" {
+            return Ok(Self::built_ins());
+        }
+        if medial_datasets::find(word).is_some() {
+            return Ok(vec![Self::BuiltIn { id: word.to_owned(), resolution: None }]);
+        }
+        Ok(Library::here()?.meshes(word)?.into_iter().map(Self::Cached).collect())
+    }
+
     /// Name for tables: the file's stem, the name in the library, or the id of the built-in shape.
     pub fn name(&self) -> String {
         match self {
             Self::File(path) => path
                 .file_stem()
                 .map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into()),
-            Self::Cached { name, .. } => name.clone(),
+            Self::Cached(Cached { name, .. }) => name.clone(),
             Self::BuiltIn { id, resolution: None } => id.clone(),
             Self::BuiltIn { id, resolution: Some(resolution) } => format!("{id}-{resolution}"),
         }
@@ -136,7 +144,7 @@ impl Source {
     pub fn dataset(&self) -> Option<&str> {
         match self {
             Self::File(_) => None,
-            Self::Cached { set, .. } => Some(set),
+            Self::Cached(Cached { set, .. }) => Some(set),
             Self::BuiltIn { .. } => Some("builtin"),
         }
     }
@@ -160,7 +168,7 @@ impl fmt::Display for Source {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::File(path) => write!(f, "{}", path.display()),
-            Self::Cached { name, .. } => write!(f, "{DATASET}{name}"),
+            Self::Cached(Cached { name, .. }) => write!(f, "{DATASET}{name}"),
             Self::BuiltIn { id, resolution: None } => write!(f, "builtin:{id}"),
             Self::BuiltIn { id, resolution: Some(r) } => write!(f, "builtin:{id}:{r}"),
         }
@@ -188,7 +196,7 @@ impl Input {
     /// When the file cannot be read or is refused, or no such built-in shape exists.
     pub fn load(source: &Source) -> Result<Self, InputError> {
         match source {
-            Source::File(path) | Source::Cached { path, .. } => {
+            Source::File(path) | Source::Cached(Cached { path, .. }) => {
                 // One read: the hash is that of the bytes that were parsed.
                 let bytes = surface::content(path)?;
                 let loaded = surface::read_content(path, &bytes)?;
@@ -303,33 +311,4 @@ pub enum InputError {
     /// The built-in shape is unknown, or its resolution out of range.
     #[error("{0}")]
     BuiltIn(String),
-}
-
-/// Smallest Jaro-Winkler similarity (1 for equal words) of a suggestion.
-const MIN_SIMILARITY: f64 = 0.8;
-
-/// `; did you mean ...?` for the most similar known word, or an empty text.
-pub fn did_you_mean<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> String {
-    // Ids have no capitals, and titles do.
-    let word = word.to_lowercase();
-    let alike = known.into_iter().map(|known| (strsim::jaro_winkler(&word, known), known));
-    match alike.max_by(|a, b| a.0.total_cmp(&b.0)) {
-        Some((similarity, known)) if similarity >= MIN_SIMILARITY => {
-            format!("; did you mean `{known}`?")
-        }
-        _ => String::new(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::did_you_mean;
-
-    #[test]
-    fn only_similar_words_are_proposed() {
-        let known = ["angle", "lambda", "qmat", "pmat"];
-        assert_eq!(did_you_mean("qamt", known), "; did you mean `qmat`?");
-        assert_eq!(did_you_mean("Lamda", known), "; did you mean `lambda`?");
-        assert_eq!(did_you_mean("nothing", known), "");
-    }
 }

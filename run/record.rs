@@ -11,10 +11,14 @@ use std::path::{Component, Path, PathBuf};
 
 use medial::complex::MedialMesh;
 use medial::metrics::Evaluation;
-use medial::simplifier::{Level, Params};
+use medial::simplifier::Params;
 use serde::{Deserialize, Serialize};
 
+use crate::level::Target;
 use crate::text::{counted, megabytes};
+
+/// Largest difference from the requested number of spheres, as a share of it, of a result at that number.
+pub const COUNT_TOLERANCE: f64 = 0.02;
 
 /// The status of one item.
 #[derive(
@@ -198,12 +202,12 @@ impl Record {
 
     /// Wall-clock seconds by stage, of a run that nothing disturbed. Those of an edition are of another run, on another
     /// machine in general: [`Self::frozen_seconds`].
-    pub(crate) fn seconds(&self) -> Option<Stages> {
+    pub fn seconds(&self) -> Option<Stages> {
         self.simplify.seconds.filter(|_| self.ran_alone() && self.edition.is_none())
     }
 
     /// Wall-clock seconds by stage, of a record of an edition.
-    pub(crate) fn frozen_seconds(&self) -> Option<Stages> {
+    pub fn frozen_seconds(&self) -> Option<Stages> {
         self.simplify.seconds.filter(|_| self.ran_alone() && self.edition.is_some())
     }
 }
@@ -273,7 +277,7 @@ impl Simplify {
 
 /// Seconds by the clock of an external program, next to the runner's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(expecting = "an object with the numbers `prepare` and `simplify`")]
+#[serde(default, expecting = "an object with the numbers `prepare` and `simplify`")]
 pub struct OwnSeconds {
     /// The method's work that does not depend on the level.
     pub prepare: Option<f64>,
@@ -392,56 +396,15 @@ impl fmt::Display for Machine {
     }
 }
 
-/// The target of a run: a level of the method, or an error bound that the runner meets by a search
-/// among such levels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Target {
-    /// [`Level::Published`].
-    #[default]
-    Published,
-    /// [`Level::Spheres`].
-    Spheres(usize),
-    /// [`Level::Native`].
-    Native(f64),
-    /// The fewest spheres that the search finds with a symmetric Hausdorff error of at most this
-    /// fraction of the diagonal.
-    MaxError(f64),
-}
-
-impl From<Level> for Target {
-    fn from(level: Level) -> Self {
-        match level {
-            Level::Published => Self::Published,
-            Level::Spheres(count) => Self::Spheres(count),
-            Level::Native(value) => Self::Native(value),
-        }
-    }
-}
-
-impl Target {
-    /// Whether it is a native level, the published one included.
-    pub(crate) fn is_native(self) -> bool {
-        matches!(self, Self::Published | Self::Native(_))
-    }
-
-    /// The level of the method, or the error bound.
-    pub fn level(self) -> Result<Level, f64> {
-        match self {
-            Self::Published => Ok(Level::Published),
-            Self::Spheres(count) => Ok(Level::Spheres(count)),
-            Self::Native(value) => Ok(Level::Native(value)),
-            Self::MaxError(bound) => Err(bound),
-        }
-    }
-}
-
-impl fmt::Display for Target {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.level() {
-            Ok(level) => level.fmt(f),
-            // Rounded, without the digits that the multiplication adds.
-            Err(bound) => write!(f, "at most {} % error", (bound * 1e12).round() / 1e10),
-        }
-    }
+/// The facts that are the same for every record of a run.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Provenance {
+    /// The machine.
+    pub machine: Machine,
+    /// SHA-256 of the running program.
+    pub binary_hash: String,
+    /// The command line.
+    pub command: String,
+    /// Version of the program.
+    pub version: String,
 }

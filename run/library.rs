@@ -8,9 +8,10 @@ use std::{env, fs, io};
 
 use etcetera::BaseStrategy;
 use medial_datasets::published::{Catalogue, Published, Set, published};
+use serde::{Deserialize, Serialize};
 
-use crate::provenance::hex_digest;
-use crate::study::source::{Source, did_you_mean};
+use crate::hash::hex_digest;
+use crate::text::did_you_mean;
 
 /// An error about published meshes.
 #[derive(Debug, thiserror::Error)]
@@ -37,6 +38,17 @@ const MOST_NAMES: usize = 5;
 /// An error about a path.
 fn at(path: &Path, why: impl ToString) -> PublicError {
     PublicError::File { path: path.to_owned(), why: why.to_string() }
+}
+
+/// A mesh in the folder.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Cached {
+    /// Its name in the library.
+    pub name: String,
+    /// The set that it belongs to.
+    pub set: String,
+    /// Its file.
+    pub path: PathBuf,
 }
 
 /// Published meshes, and the folder of their files.
@@ -137,32 +149,29 @@ impl Library {
         if found.is_empty() && set.is_none() { Err(self.unknown(word)) } else { Ok(found) }
     }
 
-    /// The inputs of a word of `--dataset`: a built-in shape, a set, the usable meshes of a package, or one mesh.
+    /// The meshes of a set, the usable ones of a package, or one mesh.
     ///
     /// # Errors
     /// When the name is unknown, or a mesh is not in the folder; the message has the command that fetches it.
-    pub fn sources(&self, word: &str) -> Result<Vec<Source>, PublicError> {
-        if medial_datasets::find(word).is_some() {
-            return Ok(vec![Source::BuiltIn { id: word.to_owned(), resolution: None }]);
-        }
+    pub fn meshes(&self, word: &str) -> Result<Vec<Cached>, PublicError> {
         let mut found = self.matching(word)?;
         // A package may hold defective meshes, which a comparison would refuse.
         if found.iter().all(|mesh| mesh.package == word) {
             found.retain(|mesh| mesh.set == Set::Public);
         }
-        let (mut sources, mut missing) = (Vec::new(), Vec::new());
+        let (mut cached, mut missing) = (Vec::new(), Vec::new());
         for mesh in found {
             if self.state(mesh)? == State::Here {
                 let (name, set) = (mesh.name.clone(), mesh.set.key().to_owned());
-                sources.push(Source::Cached { name, set, path: self.path(mesh) });
+                cached.push(Cached { name, set, path: self.path(mesh) });
             } else {
                 missing.push(mesh);
             }
         }
         // No package has the models of papers: their set is the copies that the user has.
-        let is_partial = word == Set::Papers.key() && !sources.is_empty();
+        let is_partial = word == Set::Papers.key() && !cached.is_empty();
         if missing.is_empty() || is_partial {
-            return Ok(sources);
+            return Ok(cached);
         }
         let how = match missing.iter().any(|mesh| mesh.is_file()) {
             true => "add your copies by `medial datasets fetch --from FILE`".to_owned(),
@@ -179,14 +188,14 @@ impl Library {
     /// The mesh with a name.
     ///
     /// # Errors
-    /// As [`Library::sources`]; sets and packages are unknown here.
-    pub fn source(&self, name: &str) -> Result<Source, PublicError> {
+    /// As [`Library::meshes`]; sets and packages are unknown here.
+    pub fn mesh(&self, name: &str) -> Result<Cached, PublicError> {
         // Sets and packages are words of `--dataset`, which allows several meshes.
         if !self.catalogue.meshes.iter().any(|mesh| mesh.name == name) {
             return Err(self.unknown(name));
         }
-        let source = self.sources(name)?.into_iter().next();
-        source.ok_or_else(|| self.unknown(name))
+        let cached = self.meshes(name)?.into_iter().next();
+        cached.ok_or_else(|| self.unknown(name))
     }
 
     fn unknown(&self, word: &str) -> PublicError {

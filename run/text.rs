@@ -18,13 +18,13 @@ pub fn significant(value: f64, digits: usize) -> String {
 }
 
 /// A number with at most four significant digits and no trailing zero: `0.3333`, `60`.
-pub(crate) fn trimmed(value: f64) -> String {
+pub fn trimmed(value: f64) -> String {
     let text = significant(value, 4);
     text.parse::<f64>().map_or(text, |rounded| rounded.to_string())
 }
 
 /// The least of 1, 2 and 5 times a power of ten that is not below a positive number.
-pub(crate) fn round_up(value: f64) -> f64 {
+pub fn round_up(value: f64) -> f64 {
     let power = 10.0_f64.powf(value.log10().floor());
     // Divisions round: a step of 0.1 that comes out a hair larger must not become 0.2.
     let found = [1.0, 2.0, 5.0].into_iter().find(|m| m * power >= value * (1.0 - 1e-9));
@@ -32,7 +32,7 @@ pub(crate) fn round_up(value: f64) -> f64 {
 }
 
 /// The multiples of a round step in a range, and the step: the range has at most `most` of them.
-pub(crate) fn round_steps(low: f64, high: f64, most: f64) -> (f64, Vec<f64>) {
+pub fn round_steps(low: f64, high: f64, most: f64) -> (f64, Vec<f64>) {
     let step = round_up((high - low) / most);
     // An end that misses a multiple by rounding alone still has it.
     let first = (low / step - 1e-9).ceil() as i64;
@@ -41,7 +41,7 @@ pub(crate) fn round_steps(low: f64, high: f64, most: f64) -> (f64, Vec<f64>) {
 }
 
 /// A count with commas between the thousands: `34,702`.
-pub(crate) fn grouped(count: u64) -> String {
+pub fn grouped(count: u64) -> String {
     let digits = count.to_string();
     let mut text = String::with_capacity(digits.len() + digits.len() / 3);
     for (index, digit) in digits.chars().enumerate() {
@@ -54,17 +54,17 @@ pub(crate) fn grouped(count: u64) -> String {
 }
 
 /// `1 mesh`, `13 meshes`.
-pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
+pub fn counted(count: usize, one: &str, many: &str) -> String {
     format!("{} {}", grouped(count as u64), if count == 1 { one } else { many })
 }
 
 /// Betti numbers as `1, 4, 0`, where they were computed.
-pub(crate) fn betti(numbers: Option<[u64; 3]>) -> String {
+pub fn betti(numbers: Option<[u64; 3]>) -> String {
     numbers.map_or("unknown".to_owned(), |[b0, b1, b2]| format!("{b0}, {b1}, {b2}"))
 }
 
 /// Memory in MB of a million bytes.
-pub(crate) fn megabytes(bytes: u64) -> String {
+pub fn megabytes(bytes: u64) -> String {
     grouped((bytes as f64 / 1e6).round() as u64)
 }
 
@@ -85,7 +85,7 @@ pub fn printable(text: &str) -> String {
 }
 
 /// Text cut to a number of characters, with an ellipsis where something was cut.
-pub(crate) fn shortened(text: &str, limit: usize) -> String {
+pub fn shortened(text: &str, limit: usize) -> String {
     if text.chars().count() <= limit {
         return text.to_owned();
     }
@@ -95,7 +95,7 @@ pub(crate) fn shortened(text: &str, limit: usize) -> String {
 /// Distinct file stems for names, in their order: ASCII letters, digits, `-`, `_` and `.` stay,
 /// everything else becomes `_`. No stem is empty, begins with a dot or is longer than 80 bytes,
 /// and no two are equal, not even where case is ignored.
-pub(crate) fn file_stems<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<String> {
+pub fn file_stems<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<String> {
     let mut stems: Vec<String> = Vec::new();
     for name in names {
         let base: String = name
@@ -124,9 +124,30 @@ pub fn file_stem(name: &str) -> String {
 }
 
 /// Escapes text for HTML and XML, element content and quoted attributes alike.
-pub(crate) fn escape_html(text: &str) -> String {
+pub fn escape_html(text: &str) -> String {
     let text = printable(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     text.replace('"', "&quot;").replace('\'', "&#39;")
+}
+
+/// Smallest Jaro-Winkler similarity (1 for equal words) of a suggestion.
+const MIN_SIMILARITY: f64 = 0.8;
+
+/// `; did you mean ...?` for the most similar known word, or an empty text.
+pub fn did_you_mean<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    // Ids have no capitals, and titles do.
+    let word = word.to_lowercase();
+    let alike = known.into_iter().map(|known| (strsim::jaro_winkler(&word, known), known));
+    match alike.max_by(|a, b| a.0.total_cmp(&b.0)) {
+        Some((similarity, known)) if similarity >= MIN_SIMILARITY => {
+            format!("; did you mean `{known}`?")
+        }
+        _ => String::new(),
+    }
+}
+
+/// A fraction of the diagonal as a percentage with three significant digits.
+pub fn percent(fraction: f64) -> String {
+    format!("{} %", significant(100.0 * fraction, 3))
 }
 
 #[cfg(test)]
@@ -166,5 +187,13 @@ mod tests {
             escape_html("<script>alert('x')</script>&\"\u{0}\u{202e}"),
             "&lt;script&gt;alert(&#39;x&#39;)&lt;/script&gt;&amp;&quot;\u{fffd}\u{fffd}"
         );
+    }
+
+    #[test]
+    fn only_similar_words_are_proposed() {
+        let known = ["angle", "lambda", "qmat", "pmat"];
+        assert_eq!(did_you_mean("qamt", known), "; did you mean `qmat`?");
+        assert_eq!(did_you_mean("Lamda", known), "; did you mean `lambda`?");
+        assert_eq!(did_you_mean("nothing", known), "");
     }
 }

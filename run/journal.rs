@@ -133,7 +133,7 @@ pub fn write_records(path: &Path, records: &[Record]) -> Result<(), JournalError
 }
 
 /// Replaces a file as a whole: a reader sees the old bytes or the new ones, never a part.
-pub(crate) fn replace_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
+pub fn replace_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder)?;
     }
@@ -142,7 +142,7 @@ pub(crate) fn replace_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
 
 /// One line with its line break. JSON has no infinity and no NaN and serde writes `null` for
 /// them, which no reader accepts: such a record is rejected here.
-pub(crate) fn to_line(record: &Record) -> Result<String, JournalError> {
+pub fn to_line(record: &Record) -> Result<String, JournalError> {
     let written = serde_json::to_string(record).and_then(|line| {
         let back: Record = serde_json::from_str(&line)?;
         Ok((line, back == *record))

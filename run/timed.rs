@@ -6,22 +6,17 @@
 
 use std::any::Any;
 use std::cell::Cell;
-use std::convert::Infallible;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
-use medial::complex::MedialMesh;
 use medial::heap::Usage;
-use medial::metrics::JudgeOptions;
 use medial::shape::{Cost, Shape, Substrate};
-use medial::simplifier::{
-    Level, MedialSimplifier, MethodInfo, Params, RunContext, Simplification, Simplified,
-    SimplifyError,
-};
-use medial_reports::{Stages, Status, Target};
+use medial::simplifier::{Level, MethodInfo, Simplification, Simplified, SimplifyError};
 use serde::{Deserialize, Serialize};
 
-use crate::measure::search::{Found, Measure, Probe, Search, Trying};
+use crate::level::Target;
+use crate::record::{Stages, Status};
+use crate::search::{Found, Measure, Probe, Search, Trying};
 
 /// The outcome of one level.
 pub struct LevelRun {
@@ -89,6 +84,10 @@ impl From<SimplifyError> for Fault {
         Self { status, reason: error.to_string() }
     }
 }
+
+/// Most resident bytes of an external program and its descendants together, at the times of sampling.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ProgramPeak(pub u64);
 
 /// The time that the levels of a method may use together. After it, no further level starts.
 pub struct Budget {
@@ -291,7 +290,7 @@ fn checked(level: Level, simplified: Simplified) -> Result<Simplified, Fault> {
 }
 
 /// The result of some work, with a panic turned into a fault.
-pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, SimplifyError>) -> Result<T, Fault> {
+pub fn guarded<T>(work: impl FnOnce() -> Result<T, SimplifyError>) -> Result<T, Fault> {
     // The state after a panic is not used again: callers drop the simplification.
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(outcome) => Ok(outcome?),
@@ -312,7 +311,7 @@ impl Fault {
 const PANICKED: &str = "panicked: ";
 
 /// The message of a panic.
-pub(crate) fn panic_message(payload: &(dyn Any + Send)) -> String {
+pub fn panic_message(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
     let text = text.or_else(|| payload.downcast_ref::<String>().cloned());
     format!("{PANICKED}{}", text.unwrap_or_else(|| "no message".into()))
@@ -332,7 +331,7 @@ where
 }
 
 /// The run for a bound without a result.
-fn failed(bound: f64, fault: Fault) -> LevelRun {
+pub(crate) fn failed(bound: f64, fault: Fault) -> LevelRun {
     LevelRun { level: Target::MaxError(bound), outcome: Err(fault), times: Times::default() }
 }
 
@@ -455,101 +454,5 @@ impl Bounds<'_> {
         let runs = answer(&view, self.info, || (self.prepare)(&view), &[level], &budget, |_| {});
         let run = runs.into_iter().next().expect("one level, one run");
         LevelRun { level: Target::MaxError(bound), ..run }
-    }
-}
-
-/// A method on a shape: `simplify` of the command and of Python.
-pub struct Single<'a> {
-    /// The shape.
-    pub shape: &'a Shape,
-    /// The method.
-    pub method: &'a dyn MedialSimplifier,
-    /// Native levels of its default comparison.
-    pub sweep: &'a [f64],
-    /// Its parameters.
-    pub params: &'a Params,
-    /// Seed, progress and cancellation.
-    pub context: &'a RunContext,
-    /// Measures results for an error bound.
-    pub judge: JudgeOptions,
-    /// Whether a certificate proves the error bound instead of samples.
-    pub certify: bool,
-    /// Gets each level before it is computed.
-    pub on_level: &'a dyn Fn(Level),
-}
-
-/// The result of a search for an error bound.
-#[derive(Clone, Debug, Serialize)]
-pub struct Searched {
-    /// The bound, a fraction of the diagonal.
-    pub bound: f64,
-    /// The error of the result.
-    pub hausdorff: f64,
-    /// Number of levels that were tried.
-    pub tried: usize,
-    /// Spheres of the result.
-    pub spheres: usize,
-    /// Whether the error is the upper end of a certified interval, or else a maximum of samples.
-    pub certified: bool,
-}
-
-/// Width of the interval that certifies a bound, as a share of it.
-const CERTIFIED_SHARE: f64 = 0.05;
-
-impl Single<'_> {
-    /// The run at a level, or at the level that a search for an error bound finds.
-    pub fn run(&self, target: Target) -> (LevelRun, Option<Searched>) {
-        let Self { shape, method, params, context, .. } = *self;
-        let (info, budget) = (method.info(), Budget::from_now(None));
-        let prepare = preparing(|view| method.prepare(view, params, context));
-        let bound = match target.level() {
-            Ok(level) => {
-                let view = shape.view();
-                let runs = answer(&view, info, || prepare(&view), &[level], &budget, self.on_level);
-                return (runs.into_iter().next().expect("one level, one run"), None);
-            }
-            Err(bound) => bound,
-        };
-        // The known axis does not count for the error.
-        let judge = match shape.judge(None, self.judge) {
-            Ok(judge) => judge,
-            Err(error) => return (failed(bound, SimplifyError::from(error).into()), None),
-        };
-        let measure = |mesh: &MedialMesh| -> Result<f64, String> {
-            let sampled = judge.distances(mesh).map_err(|error| error.to_string())?.hausdorff;
-            // Samples are a lower bound: above the error bound, no certificate is needed.
-            if !self.certify || sampled > bound {
-                return Ok(sampled);
-            }
-            // An upper end within the bound needs an interval much narrower than the bound.
-            let certified = judge.certify(mesh, CERTIFIED_SHARE * bound);
-            Ok(certified.map_err(|error| error.to_string())?.upper)
-        };
-        let search = Bounds {
-            shape,
-            info,
-            sweep: self.sweep,
-            prepare: &prepare,
-            measure: &measure,
-            budget: &budget,
-            searching: &|_| {},
-            trying: &|level| {
-                if context.is_cancelled() {
-                    return Err(SimplifyError::Cancelled);
-                }
-                (self.on_level)(level);
-                Ok(())
-            },
-        };
-        let mut ended = None;
-        let Ok(()) = search.answer(&[bound], &mut |run, found| {
-            ended = Some((run, found));
-            Ok::<_, Infallible>(())
-        });
-        let (run, found) = ended.expect("one bound, one run");
-        let Some(Found { within: Some(probe), tried, .. }) = found else { return (run, None) };
-        let (spheres, hausdorff) = (probe.spheres, probe.error);
-        let searched = Searched { bound, hausdorff, tried, spheres, certified: self.certify };
-        (LevelRun { level: probe.level.into(), ..run }, Some(searched))
     }
 }

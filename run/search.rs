@@ -20,11 +20,11 @@
 
 use std::collections::BTreeMap;
 
+use crate::text::significant;
 use medial::complex::MedialMesh;
 use medial::simplifier::{Level, Simplification, SimplifyError};
-use medial_reports::significant;
 
-use crate::measure::mesh_hash;
+use crate::hash::mesh_hash;
 
 /// Counts of the sweep for a method that computes them in one run, and for others.
 const COUNTS: [usize; 2] = [40, 24];

@@ -4,20 +4,18 @@
 //! run on another machine with the same results. Each of its levels has a key, by which a store finds
 //! an earlier record.
 
-use std::fmt;
 use std::time::Duration;
 
-use medial::complex::DualTriangulation;
-use medial::metrics::JudgeOptions;
-use medial::shape::ShapeOptions;
 use medial::simplifier::Params;
-use medial::surface::Sampling;
-use medial_reports::Target;
 use serde::{Deserialize, Serialize};
 
-use crate::provenance::hex_digest;
-use crate::study::external::GIVEN;
-use crate::study::source::Source;
+use crate::hash::hex_digest;
+use crate::input::Source;
+use crate::level::Target;
+use crate::scene::SceneSpec;
+
+/// Id of the pseudo-method of external results.
+pub const GIVEN: &str = "given";
 
 /// One method on one input at some levels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,8 +31,6 @@ pub struct Item {
     pub seed: u64,
     /// Number of timed repetitions of each level, at least 1.
     pub repeat: usize,
-    /// Number of threads.
-    pub threads: usize,
     /// Limits of time and memory.
     pub limits: Limits,
     /// The results that stay on disk. The default is not serialized, for workers of older builds.
@@ -44,67 +40,6 @@ pub struct Item {
     pub version: String,
     /// SHA-256 of the program that runs it, recorded only.
     pub binary: String,
-}
-
-/// The state that consecutive items can share: the input with its substrates, and the judge.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SceneSpec {
-    /// Name of the input in tables.
-    pub mesh: String,
-    /// Origin of the input.
-    pub source: Source,
-    /// SHA-256 of the input's file; of a built-in shape its surface and known axis.
-    pub hash: Option<String>,
-    /// Displacements of the vertices. Results are measured against the input without them.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub noise: Option<Noise>,
-    /// Boundary samples.
-    pub sampling: Sampling,
-    /// Triangulation of the dual Voronoi polygons.
-    pub dual: Dual,
-    /// Options of the evaluation.
-    pub measure: Measure,
-}
-
-/// Random displacements of the vertices of a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Noise {
-    /// The largest displacement, as a fraction of the bounding-box diagonal.
-    pub eta: f64,
-    /// Seed of the displacements.
-    pub seed: u64,
-}
-
-/// Triangulation of the dual Voronoi polygons.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub enum Dual {
-    /// A fan, as published.
-    #[default]
-    Fan,
-    /// Planar Delaunay.
-    Delaunay,
-}
-
-/// Options of the evaluation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Measure {
-    /// Surface samples in addition to the vertices, and about as many on the union.
-    pub samples: usize,
-    /// Levels of division of space for the volume difference; 0 leaves it out.
-    pub volume_depth: u32,
-    /// Seed of every sample.
-    pub seed: u64,
-    /// Width of the certified interval of the Hausdorff distance, a fraction of the diagonal; `None`
-    /// for no certificate.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub certify: Option<f64>,
-    /// Whether edges and faces are dropped before the evaluation.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub spheres_alone: bool,
 }
 
 /// A method, its parameters, and the name of this pair in tables.
@@ -137,7 +72,7 @@ pub struct Limits {
 }
 
 /// The results that stay on disk as `.ma`. The others can be recomputed from their records.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Keep {
     /// All results.
@@ -185,14 +120,14 @@ impl Item {
         let params: std::collections::BTreeMap<_, _> = self.method.params.0.iter().collect();
         let source = match &self.scene.source {
             // The same file in another place is the same input.
-            Source::File(_) | Source::Cached { .. } => None,
+            Source::File(_) | Source::Cached(_) => None,
             built_in @ Source::BuiltIn { .. } => Some(built_in),
         };
         // Field by field: a new field must be added here, or left out, on purpose.
-        let SceneSpec { mesh, hash, noise, sampling, dual, measure, .. } = &self.scene;
+        let SceneSpec { mesh, hash, noise, settings, .. } = &self.scene;
         let MethodSpec { id, name, fingerprint, .. } = &self.method;
-        let scene = (mesh, source, hash, noise, sampling, dual, measure);
-        let rest = (scene, (id, name, params, fingerprint), self.seed, self.threads, &self.version);
+        let scene = (mesh, source, hash, noise, settings);
+        let rest = (scene, (id, name, params, fingerprint), self.seed, &self.version);
         // Once for all levels: items of long sweeps have dozens.
         let common = serde_json::to_string(&rest).expect("plain data");
         (levels.iter())
@@ -204,43 +139,10 @@ impl Item {
     }
 }
 
-impl SceneSpec {
-    /// The options of the substrates.
-    pub fn shape_options(&self) -> ShapeOptions {
-        ShapeOptions { sampling: self.sampling, dual: self.dual.into() }
-    }
-}
-
 impl MethodSpec {
     /// The name for tables and messages: the name of the variant, or the id.
     pub fn label(&self) -> &str {
         self.name.as_deref().unwrap_or(&self.id)
-    }
-}
-
-impl Measure {
-    /// The options of the judge.
-    pub fn judge_options(&self) -> JudgeOptions {
-        let Self { samples, volume_depth, seed, .. } = *self;
-        JudgeOptions { samples, volume_depth, seed }
-    }
-}
-
-impl fmt::Display for Dual {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Fan => "fan",
-            Self::Delaunay => "delaunay",
-        })
-    }
-}
-
-impl From<Dual> for DualTriangulation {
-    fn from(dual: Dual) -> Self {
-        match dual {
-            Dual::Fan => Self::Fan,
-            Dual::Delaunay => Self::Delaunay,
-        }
     }
 }
 
@@ -255,7 +157,12 @@ impl Limits {
 mod tests {
     use std::path::PathBuf;
 
+    use medial::complex::DualTriangulation;
+    use medial::surface::Sampling;
+
     use super::*;
+    use crate::scene::Noise;
+    use crate::settings::Settings;
 
     fn item() -> Item {
         Item {
@@ -264,14 +171,15 @@ mod tests {
                 source: Source::File(PathBuf::from("bear.off")),
                 hash: Some("12ab".into()),
                 noise: None,
-                sampling: Sampling::default(),
-                dual: Dual::Fan,
-                measure: Measure {
+                settings: Settings {
+                    sampling: Sampling::default(),
+                    dual: DualTriangulation::Fan,
                     samples: 100,
                     volume_depth: 5,
                     seed: 0,
                     certify: None,
                     spheres_alone: false,
+                    threads: 2,
                 },
             },
             method: MethodSpec {
@@ -283,7 +191,6 @@ mod tests {
             levels: vec![Target::Spheres(100), Target::Native(0.1), Target::Published],
             seed: 0,
             repeat: 1,
-            threads: 2,
             limits: Limits { seconds: 300.0, bytes: 1 << 30, budget: None },
             keep: Keep::Small,
             version: "34cd".into(),
@@ -315,12 +222,12 @@ mod tests {
             |i| i.scene.mesh = "bear-2".into(),
             |i| i.scene.hash = Some("12ac".into()),
             |i| i.scene.noise = Some(Noise { eta: 0.01, seed: 1 }),
-            |i| i.scene.dual = Dual::Delaunay,
-            |i| i.scene.measure.samples += 1,
+            |i| i.scene.settings.dual = DualTriangulation::Delaunay,
+            |i| i.scene.settings.samples += 1,
             |i| i.method.id = "hem".into(),
             |i| i.method.params.set("k", "0"),
             |i| i.seed = 1,
-            |i| i.threads = 1,
+            |i| i.scene.settings.threads = 1,
             |i| i.version = "34ce".into(),
         ];
         let mut keys: Vec<String> = other.into_iter().map(key).collect();
