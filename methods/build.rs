@@ -3,7 +3,11 @@
 
 use std::collections::BTreeMap;
 use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::process::Command;
+
+use medial_source_hash::{digest, rerun_on, sources};
 
 #[allow(dead_code, reason = "a test includes this file")]
 #[allow(clippy::print_stdout, reason = "this is how a build script talks to cargo")]
@@ -32,7 +36,7 @@ pub fn hashes(root: &Path) -> BTreeMap<String, String> {
         list.lines().filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';')).collect();
     let mut files: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
     for file in
-        sources(root, &["tests", "benches", "examples", "build.rs", "source_hash.rs", "lib.rs"])
+        sources(root, &["tests", "benches", "examples", "build.rs", "lib.rs"])
     {
         let first = file.strip_prefix(root).ok().and_then(|path| path.iter().next());
         let first = first.unwrap_or_default().to_string_lossy();
@@ -42,5 +46,3 @@ pub fn hashes(root: &Path) -> BTreeMap<String, String> {
     }
     files.into_iter().map(|(module, files)| (module, digest(root, &files))).collect()
 }
-
-include!("source_hash.rs");

@@ -108,9 +108,9 @@ pub struct Fit {
     pub misfit_before: Option<f64>,
     /// The same after the similarity.
     pub misfit: Option<f64>,
-    /// How much of an error the fit can be, as a fraction of the diagonal: the largest displacement of the surface's bounding box
-    /// between this similarity and that of every other sphere alone, and at least the misfit. 0 for conventions and factors,
-    /// which are exact.
+    /// Error that the fit itself can be, as a fraction of the diagonal: the largest displacement of the surface's bounding
+    /// box between the similarities that fit the radii best, of all spheres and of every other one, and between the one of
+    /// all and this one; at least the misfit. 0 for conventions and factors, which are exact.
     pub uncertainty: f64,
     /// Whether the mesh has the wrong units without doubt: it fits with the similarity, to 1 % of the diagonal at the median
     /// (5 % for conventions and factors), and its union comes at least twice as near to the surface.
@@ -148,8 +148,9 @@ const FITTING: f64 = 0.05;
 const SPHERES: usize = 4000;
 const POINTS: usize = 1000;
 
-/// Factors between units of length: metres, centimetres, inches, decimetres or centimetres and millimetres, feet and inches.
-const FACTORS: [f64; 5] = [1000.0, 100.0, 25.4, 10.0, 12.0];
+/// Factors between units of length: of millimetres, centimetres, decimetres and metres, inches to millimetres, centimetres
+/// and feet, feet to millimetres and metres.
+const FACTORS: [f64; 8] = [1000.0, 100.0, 10.0, 25.4, 2.54, 12.0, 304.8, 0.3048];
 
 /// How many times nearer to the surface a similarity must bring the union to be needed.
 const NEARER: f64 = 2.0;
@@ -157,10 +158,15 @@ const NEARER: f64 = 2.0;
 /// Steps of the optimisation; far fewer are needed where there is an optimum to be found.
 const STEPS: usize = 60;
 
-/// How much worse than the optimum a convention may fit to be preferred, as a factor or as a mean of `|D(c) - r|`: the optimum has four
-/// parameters to follow the errors of the medial mesh.
+/// Largest ratio of the mean distance of a preferred convention to that of the optimum, whose four parameters follow the
+/// errors of the medial mesh.
 const PREFERENCE: f64 = 2.0;
-const CLOSE: f64 = 0.01;
+
+/// Mean distance of the surface to the union at which any convention is preferred, as a fraction of the diagonal.
+const CLOSE: f64 = 1e-3;
+
+/// First and last step of the search for the nearest union, as fractions of the scale and of the diagonal.
+const SEARCH_STEPS: [f64; 2] = [0.05, 1e-4];
 
 /// The share of centres that must lie in the solid for units to be believed of points without radii.
 const INSIDE: f64 = 0.95;
@@ -196,43 +202,53 @@ impl Shape {
             let starts = starts.map(|s| (mean(&s), s));
             starts.min_by(|a, b| a.0.total_cmp(&b.0)).expect("the first one").1
         };
-        let scaled = surface.optimised(&spheres, least(&mut plain.into_iter()), FitSource::Scaled);
-        let start = least(&mut all.chain([scaled]));
-        let optimum = surface.optimised(&spheres, start, FitSource::Fitted);
-        // The fewest free parameters of those that fit nearly as well as the optimum, or leave the union as near.
-        let enough = f64::max(PREFERENCE * mean(&optimum), CLOSE / optimum.scale);
         let nearness = surface.nearness(mesh);
-        let near = nearness.of(&optimum);
+        // Radii of a simplified mesh are biased, its union is not: the optimum of the radii is only a start.
+        let optimum = |start, source| {
+            let by_radii = surface.optimised(&spheres, start, source);
+            let by_union = surface.nearest(&nearness, by_radii, source);
+            (nearness.of(&by_union), by_radii, by_union)
+        };
+        let scaled = optimum(least(&mut plain.into_iter()), FitSource::Scaled);
+        let fitted = optimum(least(&mut all.chain([scaled.2])), FitSource::Fitted);
+        // The fewest free parameters that leave the union nearly as near as the optimum.
+        let enough = f64::max(PREFERENCE * fitted.0, CLOSE);
         let best = exact.into_iter().map(|(source, s)| (nearness.of(&s), source, s));
-        let best = best.filter(|(of_known, _, s)| *of_known <= near || mean(s) <= enough);
-        let best = best.min_by(|a, b| a.0.total_cmp(&b.0)).or_else(|| {
-            let of_scaled = nearness.of(&scaled);
-            let is_enough = of_scaled <= near || mean(&scaled) <= enough;
-            is_enough.then_some((of_scaled, FitSource::Scaled, scaled))
-        });
-        let (after, source, normal) = best.unwrap_or((near, FitSource::Fitted, optimum));
+        let best = best.filter(|(near, ..)| *near <= enough);
+        let best = best.min_by(|a, b| a.0.total_cmp(&b.0));
+        let ((after, by_radii, normal), source) = match best {
+            Some((near, source, s)) => ((near, s, s), source),
+            None if scaled.0 <= enough => (scaled, FitSource::Scaled),
+            None => (fitted, FitSource::Fitted),
+        };
         let [before, misfit] = [&Similarity::IDENTITY, &normal]
             .map(|s| median(&surface.residuals(&spheres, s)).unwrap_or(0.0));
         let is_free = matches!(source, FitSource::Scaled | FitSource::Fitted);
         let is_needed = misfit <= if is_free { DOUBTFUL } else { FITTING }
             && after.is_finite()
-            && NEARER * after <= nearness.of(&Similarity::IDENTITY);
+            && NEARER * after <= nearness.of(&Similarity::IDENTITY)
+            // Of a few spheres a larger scale brings any union nearer to the surface.
+            && NEARER * mean(&normal) <= mean(&Similarity::IDENTITY);
         Ok(Fit {
             similarity: surface.in_input_units(&normal),
             source,
             misfit_before: Some(before),
             misfit: Some(misfit),
-            uncertainty: surface.uncertainty(&spheres, &normal, source, misfit),
+            uncertainty: surface.uncertainty(&spheres, [&by_radii, &normal], source, misfit),
             is_needed,
         })
     }
 
-    /// The similarity of [`Shape::fit`] where [`Fit::is_needed`], for a mesh that does not fit to 1 % as it is.
+    /// The similarity of [`Shape::fit`] where [`Fit::is_needed`], for a mesh that does not fit as it is, to 1 % of the
+    /// smaller of its own extent and the diagonal.
     ///
     /// # Errors
     /// When the surface has no face.
     pub fn fit_if_needed(&self, mesh: &MedialMesh) -> Result<Option<Fit>, ShapeError> {
-        if self.misfit(mesh)?.is_some_and(|misfit| misfit <= DOUBTFUL) {
+        // A mesh that is far too small has small radii, and may lie at a corner of the surface.
+        let surface = Surface::of(self)?;
+        let extent = 1.0 / surface.by_boxes(&surface.spheres(mesh)).scale;
+        if self.misfit(mesh)?.is_some_and(|misfit| misfit <= DOUBTFUL * extent.min(1.0)) {
             return Ok(None);
         }
         Ok(Some(self.fit(mesh)?).filter(|fit| fit.is_needed))
@@ -350,7 +366,7 @@ impl Surface {
     fn uncertainty(
         &self,
         spheres: &[Sphere],
-        found: &Similarity,
+        [by_radii, found]: [&Similarity; 2],
         source: FitSource,
         misfit: f64,
     ) -> f64 {
@@ -362,13 +378,15 @@ impl Surface {
                 Vec3::select(BVec3::new(k & 1 > 0, k & 2 > 0, k & 4 > 0), self.upper, self.lower)
             })
             .collect();
-        let displacement = |first: usize| {
-            let half: Vec<Sphere> = spheres.iter().skip(first).step_by(2).copied().collect();
-            let other = self.optimised(&half, *found, source);
-            let moved = |&p: &Vec3| p.distance(other.point((p - found.shift) / found.scale));
+        let displacement = |from: &Similarity, to: &Similarity| {
+            let moved = |&p: &Vec3| p.distance(to.point((p - from.shift) / from.scale));
             corners.iter().map(moved).fold(0.0, f64::max)
         };
-        misfit.max(displacement(0)).max(displacement(1))
+        let halves = [0, 1].map(|first| {
+            let half: Vec<Sphere> = spheres.iter().skip(first).step_by(2).copied().collect();
+            displacement(by_radii, &self.optimised(&half, *by_radii, source))
+        });
+        halves.into_iter().fold(misfit.max(displacement(by_radii, found)), f64::max)
     }
 
     /// From the box around the spheres to the box around the surface.
@@ -420,6 +438,46 @@ impl Surface {
             (best, least) = (similarity, error);
             if gain <= 1e-9 * least {
                 break;
+            }
+        }
+        best
+    }
+
+    /// The similarity near a start that brings the union nearest to the surface, for `source` with or without a shift:
+    /// steps of one parameter, halved where none helps.
+    fn nearest(
+        &self,
+        nearness: &Nearness<'_>,
+        start: Similarity,
+        source: FitSource,
+    ) -> Similarity {
+        // The scale keeps the middle of the surface, or the origin of the input units.
+        let fixed = match source {
+            FitSource::Scaled => -self.units.origin / self.units.diagonal,
+            _ => (self.upper + self.lower) / 2.0,
+        };
+        let directions = if source == FitSource::Scaled { 1 } else { 4 };
+        let (mut best, mut least) = (start, nearness.of(&start));
+        let [mut step, last] = SEARCH_STEPS;
+        while step >= last {
+            let before = least;
+            for direction in 0..directions {
+                for size in [step, -step] {
+                    let moved = match direction {
+                        0 => best.then(&Similarity { scale: 1.0 + size, shift: fixed * -size }),
+                        _ => {
+                            let shift = best.shift + Vec3::AXES[direction - 1] * size;
+                            Similarity { shift, ..best }
+                        }
+                    };
+                    let near = nearness.of(&moved);
+                    if near < least {
+                        (best, least) = (moved, near);
+                    }
+                }
+            }
+            if least == before {
+                step /= 2.0;
             }
         }
         best
@@ -595,6 +653,38 @@ mod tests {
                 parts.iter().all(|&off| off <= 2.0 * fit.uncertainty + 1e-12),
                 "{scale}: {fit:?}"
             );
+        }
+    }
+
+    /// A corner at the origin holds any mesh that is far too small.
+    #[test]
+    fn a_mesh_that_is_far_too_small_has_other_units() {
+        let mesh = cuboid(Vec3::ZERO, Vec3::new(3.0, 2.0, 1.0));
+        let report = validate(&mesh).unwrap();
+        let shape = Shape::new("corner", &mesh, report, ShapeOptions::default()).unwrap();
+        let normal = *shape.normalisation();
+        let axis = shape.initial().unwrap().transformed(normal.diagonal, |p| normal.backward(p));
+        for scale in [1000.0, 25.4] {
+            let written = axis.transformed(1.0 / scale, |p| p / scale);
+            let fit = shape.fit_if_needed(&written).unwrap().expect("other units");
+            assert!((fit.similarity.scale / scale - 1.0).abs() < 1e-12, "{fit:?}");
+        }
+        // Some spheres in the right units stay.
+        let few: Vec<bool> = axis.spheres.iter().map(|s| s.centre.length() < 0.8).collect();
+        assert_eq!(shape.fit_if_needed(&axis.induced(&few)).unwrap(), None);
+    }
+
+    /// Radii that are 2 % too large, as of a coarse simplification, in a unit next to a known one.
+    #[test]
+    fn a_factor_that_is_nearly_right_is_not_taken() {
+        let (shape, mut axis) = block();
+        axis.spheres.iter_mut().for_each(|sphere| sphere.radius *= 1.02);
+        for scale in [1.0 / 10.2, 1.0 / 9.5, 1.0 / 95.0, 0.95] {
+            let written = axis.transformed(1.0 / scale, |p| p / scale);
+            let fit = shape.fit(&written).unwrap();
+            assert_eq!(fit.source, FitSource::Scaled, "{scale}: {fit:?}");
+            let off = (fit.similarity.scale / scale - 1.0).abs();
+            assert!(off < 0.02 && off < 4.0 * fit.uncertainty, "{scale}: {off} {fit:?}");
         }
     }
 

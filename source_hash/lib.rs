@@ -1,6 +1,4 @@
-// Hashes of source files for the version keys of methods. Three build scripts include this file. Cargo
-// packs only files of a package's own folder, so the other two crates have it as a symbolic link, which
-// `cargo package` replaces by the text.
+//! Hashes of source files for the versions of methods: a dependency of build scripts.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,15 +7,14 @@ use sha2::{Digest, Sha256};
 
 /// Reruns the build script when a source or the lock file of the workspace changes.
 #[allow(clippy::print_stdout, reason = "build scripts write to cargo this way")]
-#[allow(dead_code, reason = "a test includes this file")]
-fn rerun_on(sources: &[&str], lock: &str) {
+pub fn rerun_on(sources: &[&str], lock: &str) {
     for path in sources.iter().chain([&lock]) {
         println!("cargo::rerun-if-changed={path}");
     }
 }
 
 /// SHA-256 over the relative paths and the contents of files, in the order of the paths.
-fn digest(root: &Path, files: &[PathBuf]) -> String {
+pub fn digest(root: &Path, files: &[PathBuf]) -> String {
     let mut hasher = Sha256::new();
     for file in files {
         let name = file.strip_prefix(root).unwrap_or(file).to_string_lossy().replace('\\', "/");
@@ -30,7 +27,7 @@ fn digest(root: &Path, files: &[PathBuf]) -> String {
 }
 
 /// The Rust files below a folder, without those below `without`, sorted.
-fn sources(folder: &Path, without: &[&str]) -> Vec<PathBuf> {
+pub fn sources(folder: &Path, without: &[&str]) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).expect("a folder of sources") {
         let path = entry.expect("an entry").path();

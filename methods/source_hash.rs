@@ -1,1 +1,0 @@
-../source_hash.rs
