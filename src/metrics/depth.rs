@@ -20,8 +20,8 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use super::ROUNDING;
 use super::ascent::Peak;
+use super::bounds::ROUNDING;
 use super::pieces::{EXPOSED, Enclosure, Patches, Piece, burying, farthest};
 use crate::Vec3;
 use crate::complex::{MedialUnion, NearestPrimitive};

@@ -37,7 +37,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-use super::MetricError;
+use super::error::MetricError;
+use super::pieces::across;
 use super::samples::Pose;
 use crate::Vec3;
 use crate::complex::{Incidence, MedialMesh, MedialUnion};
@@ -467,16 +468,6 @@ impl Grid {
             [0, 1].map(|k| ((place[k] * self.sides[k] as f64) as usize).min(self.sides[k] - 1));
         self.buried[row * self.sides[1] + column]
     }
-}
-
-/// The unit vector orthogonal to a cone's axis in the direction of the first of `axes` that is not
-/// nearly parallel to the cone's axis.
-pub(super) fn across(frame: &ConeFrame, axes: [Vec3; 3]) -> Vec3 {
-    let [x, y, _] = axes;
-    // Below one half, so that one of two orthogonal axes always qualifies; not a simple fraction, so
-    // that rounding does not decide for symmetric shapes.
-    let is_across = x.reject_from_normalized(frame.u).length_squared() > 0.2137;
-    frame.across(if is_across { x } else { y }).unwrap_or(frame.v)
 }
 
 /// Uniform over all rotations (Shoemake 1992, "Uniform random rotations", Graphics Gems III).

@@ -5,7 +5,6 @@
 
 use std::f64::consts::TAU;
 
-use super::envelope::across;
 use crate::Vec3;
 use crate::complex::{MedialMesh, Primitive};
 use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
@@ -230,6 +229,16 @@ impl<'a> Patches<'a> {
             }
         }
     }
+}
+
+/// The unit vector orthogonal to a cone's axis in the direction of the first of `axes` that is not
+/// nearly parallel to the cone's axis.
+pub(super) fn across(frame: &ConeFrame, axes: [Vec3; 3]) -> Vec3 {
+    let [x, y, _] = axes;
+    // Below one half, so that one of two orthogonal axes always qualifies; not a simple fraction, so
+    // that rounding does not decide for symmetric shapes.
+    let is_across = x.reject_from_normalized(frame.u).length_squared() > 0.2137;
+    frame.across(if is_across { x } else { y }).unwrap_or(frame.v)
 }
 
 /// The normal of a cone's lateral at an angle, with its component across the axis multiplied by

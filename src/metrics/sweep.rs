@@ -14,9 +14,8 @@
 
 use std::f64::consts::TAU;
 
-use rayon::prelude::*;
-
 use super::ascent::{Hill, Peak, Start, ascend};
+use super::bounds::{Bound, Largest, Pieces};
 use super::depth::{Boundary, DOUBT};
 use super::pieces::{
     EXPOSED, Patches, Piece, SECTORS, burying, farthest, lateral_normal, quartered,
@@ -34,9 +33,6 @@ const FLOOR: f64 = 1e-6;
 
 /// Pieces whose extent is a larger multiple of the largest distance are rarely bounded by it.
 const COARSE: f64 = 4.0;
-
-/// Pieces that one thread bounds one after the other, each search starting from the last result.
-const RUN: usize = 256;
 
 /// Pieces for each sample, and for any number of samples.
 const PIECES: usize = 16;
@@ -66,74 +62,91 @@ pub(super) fn swept(
     [forward, reverse]
 }
 
-/// A surface to be swept.
-trait Swept: Sync {
-    /// A part of the surface.
-    type Piece: Clone + Send + Sync;
-
-    /// Bounds a piece: `None` if it does not exceed `enough`.
-    fn bound(&self, piece: &mut Self::Piece, enough: f64, near: &mut Near) -> Option<Bound>;
-
-    /// Appends pieces that together cover a piece.
-    fn divide(&self, piece: &Self::Piece, parts: &mut Vec<Self::Piece>);
-}
-
-/// Where the searches for the piece before ended: most pieces are next to it.
+/// Where the searches for the piece before ended.
 #[derive(Default)]
 struct Near {
     place: usize,
     face: Option<u32>,
 }
 
-/// A piece that may exceed the largest distance.
-#[derive(Clone, Copy)]
-struct Bound {
-    centre: Vec3,
-    /// The distance at the centre, 0 if that is not on the surface.
-    reached: f64,
-    upper: f64,
+/// Pieces that are swept: the largest ones are divided, and all distances above a known one are collected.
+struct Swept<'a, S> {
+    side: &'a S,
+    /// A piece is divided if it exceeds the largest distance by more than this share, or at least `floor`.
+    share: f64,
+    floor: f64,
+    known: f64,
+    /// Number of pieces that may still be bounded.
+    left: usize,
+    points: Vec<Vec3>,
+    values: Vec<f64>,
 }
 
 /// The peaks of one surface that are farther from the other one than `known`, at most [`SEEDS`]. Samples
-/// gave `start`, which also limits the number of pieces. The result is the same for any number of
-/// threads.
-fn peaks_above<S: Swept>(
+/// gave `start`, which also limits the number of pieces.
+fn peaks_above<S: Surface>(
     side: &S,
-    mut pieces: Vec<S::Piece>,
+    pieces: Vec<S::Piece>,
     (hill, start): (&impl Hill, &Start<'_>),
     (known, share): (f64, f64),
 ) -> Vec<Peak> {
-    let mut left = (PIECES * start.points.len()).min(MOST_PIECES);
+    let left = (PIECES * start.points.len()).min(MOST_PIECES);
     let floor = FLOOR * start.pose.diameter();
-    let enough = |largest: f64| largest + f64::max(share * largest, floor);
-    let (mut largest, mut points, mut values) = (known, Vec::new(), Vec::new());
-    while !pieces.is_empty() {
-        left = left.saturating_sub(pieces.len());
-        let limit = enough(largest);
-        let bounds = pieces.par_chunks_mut(RUN).flat_map_iter(|run| {
-            let mut near = Near::default();
-            let bounds = run.iter_mut().map(|piece| side.bound(piece, limit, &mut near));
-            bounds.collect::<Vec<_>>()
-        });
-        let bounds: Vec<Option<Bound>> = bounds.collect();
-        for bound in bounds.iter().flatten().filter(|bound| bound.reached > known) {
-            points.push(bound.centre);
-            values.push(bound.reached);
-            largest = largest.max(bound.reached);
-        }
-        let uppers = bounds.iter().map(|bound| bound.map_or(0.0, |bound| bound.upper));
-        let mut open: Vec<(f64, &S::Piece)> = uppers.zip(&pieces).collect();
-        open.retain(|&(upper, _)| upper > enough(largest));
-        if open.len() > left / 4 {
-            open.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-            open.truncate(left / 4);
-        }
-        let mut parts = Vec::with_capacity(4 * open.len());
-        open.iter().for_each(|(_, piece)| side.divide(piece, &mut parts));
-        pieces = parts;
+    let (points, values) = (Vec::new(), Vec::new());
+    let mut swept = Swept { side, share, floor, known, left, points, values };
+    let mut largest = Largest::above(known);
+    largest.search(&mut swept, pieces, usize::MAX).expect("the number of pieces is limited");
+    let (points, values) = (&swept.points[..], &swept.values[..]);
+    let spacing = NARROW * largest.lower;
+    ascend(hill, &Start { points, values, spacing, seeds: SEEDS, ..*start })
+}
+
+impl<S: Surface> Pieces for Swept<'_, S> {
+    type Piece = S::Piece;
+    type Near = Near;
+    const RUN: usize = 256;
+
+    fn begin(&mut self, pieces: &[Self::Piece], _: f64) {
+        self.left = self.left.saturating_sub(pieces.len());
     }
-    let (points, values) = (&points[..], &values[..]);
-    ascend(hill, &Start { points, values, spacing: NARROW * largest, seeds: SEEDS, ..*start })
+
+    fn enough(&self, lower: f64) -> f64 {
+        lower + f64::max(self.share * lower, self.floor)
+    }
+
+    fn bound(&self, piece: &mut Self::Piece, _: f64, enough: f64, near: &mut Near) -> Bound {
+        self.side.bound(piece, enough, near).unwrap_or(Bound::above(0.0))
+    }
+
+    fn collect(&mut self, bound: &Bound) {
+        if bound.reached > self.known {
+            self.points.push(bound.at);
+            self.values.push(bound.reached);
+        }
+    }
+
+    fn limit(&self, open: &mut Vec<(f64, &Self::Piece)>) {
+        if open.len() > self.left / 4 {
+            open.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+            open.truncate(self.left / 4);
+        }
+    }
+
+    fn divide(&self, piece: &Self::Piece, parts: &mut Vec<Self::Piece>) {
+        self.side.divide(piece, parts);
+    }
+}
+
+/// A surface to be swept.
+trait Surface: Sync {
+    /// A part of the surface.
+    type Piece: Send + Sync;
+
+    /// Bounds a piece: `None` if it does not exceed `enough`.
+    fn bound(&self, piece: &mut Self::Piece, enough: f64, near: &mut Near) -> Option<Bound>;
+
+    /// Appends pieces that together cover a piece.
+    fn divide(&self, piece: &Self::Piece, parts: &mut Vec<Self::Piece>);
 }
 
 /// The largest rise of a linear function from a point to some others.
@@ -146,7 +159,7 @@ struct SweptSurface<'a> {
     boundary: &'a Boundary<'a>,
 }
 
-impl Swept for SweptSurface<'_> {
+impl Surface for SweptSurface<'_> {
     /// A triangle, and a point outside the union that was near to the triangle that it is a part of.
     type Piece = ([Vec3; 3], Option<Vec3>);
 
@@ -183,7 +196,7 @@ impl Swept for SweptSurface<'_> {
             false => (attained_at.map_or(Vec3::ZERO, |c| c - centre), -deepest.signed),
         };
         let upper = above.max(here + rise(gradient.normalize_or_zero(), centre, corners));
-        (upper > enough).then_some(Bound { centre, reached: depth.lower, upper })
+        (upper > enough).then_some(Bound { at: centre, reached: depth.lower, upper })
     }
 
     fn divide(&self, (triangle, outside): &Self::Piece, parts: &mut Vec<Self::Piece>) {
@@ -294,7 +307,7 @@ impl Other {
     }
 }
 
-impl Swept for SweptUnion<'_> {
+impl Surface for SweptUnion<'_> {
     type Piece = Hinted;
 
     fn bound(&self, (piece, hint): &mut Hinted, enough: f64, near: &mut Near) -> Option<Bound> {
@@ -310,7 +323,7 @@ impl Swept for SweptUnion<'_> {
             && self.is_overtopped(piece, &[(a + b + c).normalize()])
         {
             // Too large for a bound by its distance, and buried.
-            return Some(Bound { centre, reached: 0.0, upper: f64::INFINITY });
+            return Some(Bound::above(f64::INFINITY));
         }
         let is_buried_in =
             |primitive| self.patches.hulls.largest_over(primitive, corners) < -EXPOSED;
@@ -340,7 +353,7 @@ impl Swept for SweptUnion<'_> {
         }
         *hint = Some((closest.face, deepest.primitive));
         let reached = if signed >= -EXPOSED { distance } else { 0.0 };
-        Some(Bound { centre, reached, upper })
+        Some(Bound { at: centre, reached, upper })
     }
 
     fn divide(&self, (piece, hint): &Hinted, parts: &mut Vec<Hinted>) {
