@@ -158,7 +158,7 @@ fn evaluate(
 /// A medial mesh in units of the surface's diagonal.
 fn normalised(mesh: &MedialMesh, shape: &Shape) -> MedialMesh {
     let to_normal = shape.normalisation();
-    mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p))
+    mesh.to_normal(&to_normal)
 }
 
 /// The evaluations next to each other: a row for each metric, a column for each file.

@@ -203,7 +203,9 @@ fn examine(
     if !path.is_file() {
         return surface::validate(mesh).map_err(Failure::input);
     }
-    let inspection = surface::inspect(path).map_err(Failure::input)?;
+    let inspection = surface::content(path)
+        .and_then(|bytes| surface::inspect(path, &bytes))
+        .map_err(Failure::input)?;
     warnings.extend(inspection.refused.map(|fault| fault.to_string()));
     warnings.extend(inspection.report.repairs.iter().map(ToString::to_string));
     warnings.extend(inspection.report.warnings.iter().cloned());
@@ -250,7 +252,7 @@ fn power_crust_of(
     let balls = balls.map_err(|error| Failure::at(mesh, error))?;
     let to_normal = shape.normalisation();
     let inner = match axis {
-        Some(axis) => axis.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p)).spheres,
+        Some(axis) => axis.to_normal(&to_normal).spheres,
         None => balls.inner,
     };
     let named = arguments.axis.as_ref().unwrap_or(mesh);

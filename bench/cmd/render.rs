@@ -245,7 +245,7 @@ impl Read {
         for path in &arguments.axes {
             let (mesh, notes) = read_axis(path, &shape, arguments.fitting)?.0.with_remarks();
             warnings.extend(notes);
-            axes.push(mesh.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p)));
+            axes.push(mesh.to_normal(&to_normal));
         }
         let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into();
         let names = arguments.axes.iter().map(stem).collect();

@@ -296,7 +296,7 @@ fn prepare<'s>(
         remarks.push(format!("has the same bytes as {same_as}"));
     }
     let units = *shape.normalisation();
-    let mesh = mesh.transformed(1.0 / units.diagonal, |p| units.forward(p));
+    let mesh = mesh.to_normal(&units);
     Ok(Box::new(move |level: Level| {
         let spheres = mesh.spheres.len();
         match level {
@@ -661,7 +661,7 @@ fn read_external(path: &Path, bytes: &[u8], options: ReadOptions) -> Result<Load
 }
 
 fn read_surface(path: &Path, bytes: &[u8]) -> Result<LoadedMa, String> {
-    let surface = surface::read_any(path, bytes).map_err(|error| error.to_string())?.mesh;
+    let surface = surface::inspect(path, bytes).map_err(|error| error.to_string())?.mesh;
     let spheres = surface.vertices.iter().map(|&v| Sphere::new(v, 0.0)).collect();
     let mesh = MedialMesh::from_simplices(spheres, vec![], surface.faces);
     let mesh = mesh.map_err(|error| format!("{}: {error}", path.display()))?;

@@ -76,7 +76,7 @@ impl Axis {
 
 /// A medial mesh of normalised units in those of the input.
 pub fn in_input_units(mesh: &MedialMesh, units: &Normalisation) -> MedialMesh {
-    mesh.transformed(units.diagonal, |point| units.backward(point))
+    mesh.to_input(&units)
 }
 
 /// Contact samples and their indices, words of the shape's options, whether it is the initial medial mesh.
@@ -292,7 +292,7 @@ impl Axis {
             let shape = model.shape(&ShapeOptions::default())?;
             let units = *shape.normalisation();
             let judge = model.judge(options)?;
-            let normal = mesh.transformed(1.0 / units.diagonal, |point| units.forward(point));
+            let normal = mesh.to_normal(&units);
             monitor.at(if certify.is_some() { "measuring and certifying" } else { "measuring" });
             let mut evaluation = judge.evaluate_certified(&normal, certify)?;
             evaluation.move_witnesses(|point| units.backward(point));

@@ -31,8 +31,7 @@ pub fn render<'py>(
         monitor.at("reading");
         let shape = model.shape(&ShapeOptions::default())?;
         let units = *shape.normalisation();
-        let normal =
-            |mesh: &MedialMesh| mesh.transformed(1.0 / units.diagonal, |p| units.forward(p));
+        let normal = |mesh: &MedialMesh| mesh.to_normal(&units);
         let axes = axes.into_iter().map(|(name, mesh)| (name, normal(&mesh))).collect();
         draw(words, shape, axes, &|stage| monitor.at(stage)).map_err(|failure| {
             let kind = if failure.code == Exit::Usage { Kind::Parameter } else { Kind::Input };

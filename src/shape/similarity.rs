@@ -342,7 +342,7 @@ impl Surface {
     /// The distances of points of the surface to the union of a medial mesh in input units.
     fn nearness(&self, mesh: &MedialMesh) -> Nearness<'_> {
         let units = self.units;
-        let normal = mesh.transformed(1.0 / units.diagonal, |p| units.forward(p));
+        let normal = mesh.to_normal(&units);
         Nearness { union: MedialUnion::new(&normal).ok(), points: &self.points }
     }
 
@@ -532,7 +532,7 @@ mod tests {
         let shape = Shape::new("block", &mesh, report, options).unwrap();
         let normal = *shape.normalisation();
         let initial = shape.initial().unwrap();
-        let axis = initial.transformed(normal.diagonal, |p| normal.backward(p));
+        let axis = initial.to_input(&normal);
         (shape, axis)
     }
 
@@ -607,7 +607,7 @@ mod tests {
             ShapeOptions { sampling: "vertices".parse().unwrap(), ..ShapeOptions::default() };
         let shape = Shape::new("bar", &bar, report, options).unwrap();
         let normal = *shape.normalisation();
-        let initial = shape.initial().unwrap().transformed(normal.diagonal, |p| normal.backward(p));
+        let initial = shape.initial().unwrap().to_input(&normal);
         assert!(shape.misfit(&initial).unwrap().unwrap() > 0.4);
         assert_eq!(shape.fit_if_needed(&initial).unwrap(), None);
         assert_eq!(shape.fit(&initial).unwrap().source, FitSource::Units);
