@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use medial::complex::{LoadedMa, MedialMesh};
-use medial::metrics::{Evaluation, Judge, MetricError, Witness, WitnessSide, sheet_difference};
+use medial::metrics::{Evaluation, Judge, MetricError, Witness, WitnessSide};
 use medial::shape::{Fit, Shape, ShapeOptions};
 use medial_reports::{measured_rows, significant};
 use serde::Serialize;
@@ -150,15 +150,14 @@ fn evaluate(
     // Points are looked for in the surface file.
     evaluation.move_witnesses(|point| shape.normalisation().backward(point));
     if let (Some(reference), Some(structure)) = (reference, &mut evaluation.structure) {
-        structure.known = Some(sheet_difference(&mesh, reference).map_err(failed)?);
+        structure.known = Some(judge.sheet_difference(&mesh, reference).map_err(failed)?);
     }
     Ok(Evaluated { evaluation, fit, place: None, notes, defects })
 }
 
 /// A medial mesh in units of the surface's diagonal.
 fn normalised(mesh: &MedialMesh, shape: &Shape) -> MedialMesh {
-    let to_normal = shape.normalisation();
-    mesh.to_normal(&to_normal)
+    mesh.to_normal(shape.normalisation())
 }
 
 /// The evaluations next to each other: a row for each metric, a column for each file.

@@ -252,7 +252,7 @@ fn power_crust_of(
     let balls = balls.map_err(|error| Failure::at(mesh, error))?;
     let to_normal = shape.normalisation();
     let inner = match axis {
-        Some(axis) => axis.to_normal(&to_normal).spheres,
+        Some(axis) => axis.to_normal(to_normal).spheres,
         None => balls.inner,
     };
     let named = arguments.axis.as_ref().unwrap_or(mesh);

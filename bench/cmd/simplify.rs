@@ -310,7 +310,7 @@ impl Outputs {
         let mut note = None;
         if let Some(path) = &self.output {
             let back = shape.normalisation();
-            let mesh = result.mesh.to_input(&back);
+            let mesh = result.mesh.to_input(back);
             complex::write(path, &mesh).map_err(Failure::input)?;
             note = left_out(path, &mesh);
         }

@@ -132,7 +132,7 @@ impl Scene {
     /// A result in the units of the input.
     pub fn in_input_units(&self, mesh: &MedialMesh) -> MedialMesh {
         let back = self.shape().normalisation();
-        mesh.to_input(&back)
+        mesh.to_input(back)
     }
 }
 

@@ -9,13 +9,14 @@ use super::cover::CoverTest;
 use super::envelope::{EnvelopeOptions, sample_envelope};
 use super::error::MetricError;
 use super::evaluation::{
-    AxisDistances, Certificate, Cover, Distances, Evaluation, MeanAndP95, Structure,
+    AxisDistances, Certificate, Cover, Distances, Evaluation, MeanAndP95, SheetDifference,
+    Structure,
 };
 use super::hausdorff::{DistanceOptions, distances_with_envelope};
 use super::quality::{counts, triangle_quality};
 use super::samples::{Pose, SurfaceSamples};
 use super::spikes::{centres_outside, protrusion, spikes};
-use super::structure::StructureSurface;
+use super::structure::{StructureSurface, sheet_difference};
 use super::union_topology::topology_warning;
 use super::volume::{Sides, VolumeOptions, Volumes, box_in, volumes_in};
 use crate::complex::{MedialMesh, MedialUnion, betti, euler};
@@ -258,6 +259,20 @@ impl Judge {
             uncovered_over_surface: MeanAndP95::of(uncovered_at),
             overshoot_over_boundary: MeanAndP95::of(overshoot_at),
         })
+    }
+
+    /// The sheets of a medial mesh against those of a reference, both in units of the surface's diagonal: the same for
+    /// every numbering of their spheres.
+    ///
+    /// # Errors
+    /// When a mesh is empty or not valid, or has no union.
+    pub fn sheet_difference(
+        &self,
+        mesh: &MedialMesh,
+        reference: &MedialMesh,
+    ) -> Result<SheetDifference, MetricError> {
+        let samples = self.samples()?;
+        sheet_difference(&samples.ordered(mesh)?.0, &samples.ordered(reference)?.0)
     }
 
     fn volumes(

@@ -462,7 +462,7 @@ const MATCH_SAMPLES: usize = 4_000;
 ///
 /// # Errors
 /// When a mesh is empty or not valid.
-pub fn sheet_difference(
+pub(super) fn sheet_difference(
     mesh: &MedialMesh,
     reference: &MedialMesh,
 ) -> Result<SheetDifference, MetricError> {
