@@ -552,7 +552,7 @@ impl Crossings {
         self.pairs_with(|_| true)
     }
 
-    /// The pairs that cross and have a face for which `is_asked`, ascending.
+    /// The pairs that cross and have a face for which `is_asked` holds, ascending.
     pub fn pairs_with(&self, is_asked: impl Fn(u32) -> bool + Sync) -> Vec<[u32; 2]> {
         let mut pairs: Vec<[u32; 2]> = (0..self.tree.len())
             .into_par_iter()

@@ -28,19 +28,19 @@ use crate::surface::TriangleBvh;
 /// Number of samples from which an ascent starts.
 pub(super) const SEEDS: usize = 72;
 
-/// Seeds that are followed to the last step.
+/// Number of seeds that are followed to the last step.
 const LAST_SEEDS: usize = 6;
 
-/// Rounds at one step.
+/// Number of rounds with one length of step.
 const ROUNDS: usize = 3;
 
-/// Times that the step is halved: to a thousandth of the distance between samples.
+/// Number of halvings of the step: to a thousandth of the distance between samples.
 const HALVINGS: usize = 10;
 
-/// Seeds are chosen among this many times as many samples: the largest are often all in one place.
+/// Samples for each seed among which seeds are chosen: the largest are often all in one place.
 const CROWD: usize = 40;
 
-/// Smaller gains than this fraction of the diameter are rounding.
+/// Gain below which a step is rounding, as a fraction of the diameter.
 const GAIN: f64 = 1e-10;
 
 /// A place and its distance from the other surface.

@@ -47,10 +47,10 @@ use crate::geometry::planar_frame::PlanarFrame;
 use crate::geometry::trees::in_morton_order;
 use crate::surface::{TriMesh, TriangleBvh};
 
-/// Bounds on the pieces of a round for small inputs and for any: about 0.7 and 2 GB.
+/// Limits of pieces of a round for small and for large inputs: about 0.7 and 2 GB.
 const MAX_PIECES: [usize; 2] = [1 << 22, 1 << 24];
 
-/// Between these bounds, the pieces of a round for each piece to begin with.
+/// Limit of pieces of a round for each initial piece, between the two of [`MAX_PIECES`].
 const MAX_GROWTH: usize = 64;
 
 /// Encloses the Hausdorff distance in an interval no wider than `tolerance`, in the unit of both,
@@ -60,7 +60,7 @@ const MAX_GROWTH: usize = 64;
 /// the distance is within one tolerance of its maximum.
 ///
 /// # Errors
-/// A tolerance below [`FINEST`] or not a number; an interval that would need too many pieces; a
+/// A tolerance below [`FINEST`](super::FINEST) or not a number; an interval that would need too many pieces; a
 /// medial mesh without a union; a surface without faces.
 pub fn certify(
     surface: &TriMesh,

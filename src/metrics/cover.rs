@@ -50,16 +50,16 @@ use crate::surface::{Closest, InsideTest, Side, TriMesh, TriangleBvh};
 /// Half diagonal of the smallest cubes that a proof of zero divides, in diagonals of the surface.
 pub const SMALLEST: f64 = 1e-6;
 
-/// Cubes of a round up to which a proof of zero goes on.
+/// Number of cubes of a round above which a proof of zero is given up.
 const MOST_FOR_ZERO: usize = 1 << 19;
 
 /// The same for a medial mesh, which seldom contains a solid or fits into it.
 const MOST_FOR_ZERO_OF_MESH: usize = 1 << 16;
 
-/// Cubes of a round at most: about 1 GB.
+/// Limit of cubes of a round: about 1 GB.
 const MOST: usize = 1 << 22;
 
-/// Triangles near a cube up to which they are cut to it.
+/// Number of triangles near a cube above which they are not cut to it.
 const MOST_CUT: usize = 12;
 
 /// Half the diagonal of a cube of half side 1.
@@ -383,7 +383,7 @@ struct Cube {
 /// What a cube inherits about the surface.
 #[derive(Clone, Copy)]
 enum Place {
-    /// It can meet the surface, of which this face is near.
+    /// It can meet the surface near this face.
     Near(Option<u32>),
     /// It is within the solid.
     Inside,
@@ -403,7 +403,7 @@ struct Cubes<F> {
     goal: f64,
     /// Whether the search still looks for a proof of zero.
     proves: bool,
-    /// Number of cubes of a round up to which it does.
+    /// Number of cubes of a round above which it gives up.
     most_for_zero: usize,
 }
 

@@ -36,8 +36,8 @@ const MAX_PIECES: usize = 1 << 14;
 /// Limit of points searched for the largest depth. Then it is a lower bound only.
 const MAX_SEARCHES: usize = 256;
 
-/// Bounds of a depth that are farther apart than this share of the extent of a piece of the surface are improved by
-/// a search, to half of that.
+/// Width of the interval around a depth, as a share of the extent of a piece of the surface, above which a search halves
+/// it.
 pub(super) const DOUBT: f64 = 0.25;
 
 /// Width of the interval around a depth searched for the largest, as a share of it.

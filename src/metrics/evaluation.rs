@@ -450,7 +450,7 @@ pub struct Features {
 pub struct Completeness {
     /// Number of balls.
     pub balls: u32,
-    /// Share of their centres within [`REACHED`].
+    /// Share of their centres within [`REACHED`](super::REACHED).
     pub found: Option<f64>,
     /// 95th percentile of the distances.
     pub p95: Option<f64>,

@@ -22,14 +22,14 @@ use super::volume::{Sides, VolumeOptions, Volumes, box_in, volumes_in};
 use crate::complex::{MedialMesh, MedialUnion, betti, euler};
 use crate::surface::{InsideTest, Side, SignedDistance, TriMesh, TriangleBvh};
 
-/// Mean error from which radii that do not fit the surface cause a warning. A result with a smaller
-/// error is right, for any radii.
+/// Mean error, as a fraction of the diagonal, above which radii that do not fit the surface cause a warning. A result with
+/// a smaller error is right, for any radii.
 const LARGE_MEAN: f64 = 0.005;
 
-/// Width of the intervals of one-sided errors where none is requested.
+/// Width of the intervals of one-sided errors where none is requested, as a fraction of the diagonal.
 const COVER_TOLERANCE: f64 = 1e-3;
 
-/// For centres closer to the surface than this the ratio of radius to distance means nothing.
+/// Distance from the surface, as a fraction of the diagonal, below which the ratio of a radius to it means nothing.
 const ON_SURFACE: f64 = 1e-6;
 
 /// How results are measured.
@@ -198,7 +198,7 @@ impl Judge {
     }
 
     /// An interval no wider than `tolerance` that holds the Hausdorff distance of
-    /// [`certify`](super::certify), as fractions of the diagonal.
+    /// [`certify`], as fractions of the diagonal.
     ///
     /// # Errors
     /// As [`Judge::evaluate`], and when the tolerance is out of range or too fine.

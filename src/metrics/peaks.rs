@@ -13,7 +13,7 @@ use crate::complex::MedialMesh;
 use crate::geometry::trees::in_morton_order;
 use crate::surface::{TriMesh, TriangleBvh};
 
-/// The sweep of a search leaves out distances that exceed the largest known one by a smaller share.
+/// Excess over the largest known distance, as a share of it, that the sweep of a search leaves out.
 const SHARE: f64 = 0.02;
 
 /// The worst places of a medial mesh, the largest distance first.

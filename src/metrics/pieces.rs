@@ -9,7 +9,7 @@ use crate::Vec3;
 use crate::complex::{MedialMesh, Primitive};
 use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
 
-/// The primitives as whole convex bodies, unlike the parts in [`MedialUnion`].
+/// The primitives as whole convex bodies, unlike the parts of a [`MedialUnion`](crate::complex::MedialUnion).
 pub(super) struct Hulls {
     spheres: Vec<Sphere>,
     cones: Vec<Cone>,
@@ -62,17 +62,17 @@ pub(super) fn quartered(
     [[a, f, e], [f, b, d], [e, d, c], [d, e, f]]
 }
 
-/// A point of a primitive's surface is on the boundary of the union, up to rounding, if it is no
-/// deeper than this in any primitive.
+/// Depth in a primitive, as a fraction of the surface's diameter, from which a point is not on the boundary of the union:
+/// above rounding.
 pub(super) const EXPOSED: f64 = 1e-12;
 
-/// The signed distance at the centre of a piece of some reach from which on a primitive buries all of it: any such
-/// primitive ends a search.
+/// The signed distance at the centre of a piece below which a primitive buries all of a piece of this reach, and ends a
+/// search.
 pub(super) fn burying(reach: f64) -> f64 {
     -(EXPOSED + reach) * (1.0 + 1e-9)
 }
 
-/// Initial parts of a cone's lateral around its axis.
+/// Number of initial parts of a cone's lateral around its axis.
 pub(super) const SECTORS: u32 = 6;
 
 /// The surfaces of all primitives of a medial mesh.

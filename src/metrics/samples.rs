@@ -165,10 +165,10 @@ fn uniform_in(triangle: usize, rng: &mut Pcg64) -> Placed {
 // All lists are ordered along a Morton curve in this frame. Its cells are offset from all round
 // numbers, so that the rounding of a rotation hardly ever moves a point into another cell.
 
-/// Candidates whose distances agree to this, as a fraction, are equally far.
+/// Relative difference up to which candidates are equally far.
 const EQUAL: f64 = 1e-9;
 
-/// Frames whose sums over all triangles agree to this are symmetric to each other.
+/// Difference of sums over all triangles up to which frames are symmetric to each other.
 const SYMMETRIC: f64 = 1e-10;
 
 /// Bound on the number of candidates times the number of triangles. A polyhedral group has 120

@@ -37,37 +37,47 @@ use crate::surface::{
     smooth_normals,
 };
 
-/// Excess over the least distance up to which the surface touches a ball. So two planes count as one contact if they turn
-/// by less than 28 degrees.
+/// Excess over the least distance, as a share of it, up to which the surface touches a ball. So two planes count as one
+/// contact if they turn by less than 28 degrees.
 pub const CONTACT: f64 = 0.03;
 
-/// Distance within which a feature is reached and a medial ball is found.
+/// Distance within which a feature is reached and a medial ball is found, as a fraction of the diagonal.
 pub const REACHED: f64 = 0.01;
 
 /// Angle, in degrees, by which the surface turns at a sharp edge.
 pub const SHARP_ANGLE: f64 = 30.0;
 
-/// Depth below which a point counts as one of the surface.
+/// Depth below which a point counts as one of the surface, as a fraction of the diagonal.
 const ON_SURFACE: f64 = 1e-3;
 
-/// Depth outside below which a point is outside by rounding.
+/// Distance from the solid below which a point is outside by rounding, as a fraction of the diagonal.
 const ROUNDING: f64 = 1e-6;
 
-/// Samples of sheets, and of seams, boundaries and curves each; junctions at most; surface points.
+/// Number of samples of sheets.
 const SHEET_SAMPLES: usize = 600;
+
+/// Number of samples of seams, of boundaries and of curves. Limit of junctions.
 const CURVE_SAMPLES: usize = 200;
+
+/// Number of surface points whose medial balls are sought.
 const SURFACE_SAMPLES: usize = 1_000;
 
-/// Samples along sharp edges: their spacing, and about how many at most.
+/// Spacing of the samples along sharp edges, as a fraction of the diagonal.
 const FEATURE_SPACING: f64 = 0.005;
+
+/// Limit of samples along sharp edges.
 const FEATURE_SAMPLES: f64 = 4_000.0;
 
-/// Samples that look for parts outside: their spacing, how many a side has at most, and about how many in all.
+/// Spacing of the samples that look for parts outside, as a fraction of the diagonal.
 const OUTSIDE_SPACING: f64 = 0.02;
+
+/// Limit of these samples along a side.
 const OUTSIDE_SIDE: f64 = 16.0;
+
+/// Approximate limit of all of these samples.
 const OUTSIDE_SAMPLES: f64 = 2e5;
 
-/// Areas of sheets that are listed.
+/// Limit of sheets whose areas are listed.
 const LISTED: usize = 32;
 
 /// What the structure of all medial meshes is measured against: one surface.
@@ -452,7 +462,7 @@ fn mean_and_p95(values: &[f64]) -> [Option<f64>; 2] {
 
 // Sheets of two medial meshes against each other.
 
-/// Samples of each medial mesh.
+/// Number of samples of each medial mesh.
 const MATCH_SAMPLES: usize = 4_000;
 
 /// Matches the sheets of a medial mesh to those of a reference, both in units of the solid's diagonal.

@@ -25,22 +25,25 @@ use crate::complex::{Incidence, MedialUnion, Primitive};
 use crate::geometry::planar_frame::PlanarFrame;
 use crate::surface::{TriMesh, TriangleBvh};
 
-/// Pieces that exceed the largest known distance by a smaller share are not divided, for a final figure.
+/// Excess over the largest known distance, as a share of it, below which a piece is not divided for a final figure.
 pub(super) const FINAL_SHARE: f64 = 0.005;
 
-/// Nor are those that exceed it by less than this share of the diameter.
+/// Excess over the largest known distance, as a share of the diameter, below which no piece is divided.
 const FLOOR: f64 = 1e-6;
 
-/// Pieces whose extent is a larger multiple of the largest distance are rarely bounded by it.
+/// Extent of a piece, in largest distances, above which its distance rarely bounds it.
 const COARSE: f64 = 4.0;
 
-/// Pieces for each sample, and for any number of samples.
+/// Limit of pieces for each sample.
 const PIECES: usize = 16;
+
+/// Limit of pieces for any number of samples.
 const MOST_PIECES: usize = 1 << 18;
 
-/// Peaks that are sought uphill from the largest distances of the sweep, and the first step, as a share of
-/// the largest distance.
+/// Limit of distances of the sweep from which an ascent starts.
 const SEEDS: usize = 6;
+
+/// First step of these ascents, as a share of the largest distance.
 const NARROW: f64 = 0.25;
 
 /// The peaks of both surfaces that are farther from the other one than `known` by more than a `share`, from the

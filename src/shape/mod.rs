@@ -272,7 +272,7 @@ impl Shape {
     }
 }
 
-/// Why a substrate could not be built.
+/// Reason why a substrate is not built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShapeError {
     /// The bounding box is empty, flat to a point, or not finite.
@@ -372,13 +372,13 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// Does `work` and says what it cost.
+    /// The result of `work` with its cost.
     pub fn of<T>(work: impl FnOnce() -> T) -> (T, Self) {
         Self::clocked(|| usage_of(work))
     }
 
-    /// As [`Cost::of`], for a substrate: what it needs while it is built counts as its own, not as
-    /// that of the work that requests it.
+    /// As [`Cost::of`], for a substrate: memory while it is built counts as its own, not as that of the work that
+    /// requests it.
     fn of_substrate<T>(work: impl FnOnce() -> T) -> (T, Self) {
         Self::clocked(|| usage_apart(work))
     }

@@ -101,10 +101,10 @@ impl fmt::Display for FitSource {
 pub struct Fit {
     /// From the units of the file to those of the surface.
     pub similarity: Similarity,
-    /// What the similarity is.
+    /// Origin of the similarity.
     pub source: FitSource,
-    /// Median of `|D(c) - r|` over the spheres as they stand in the file, as a fraction of the surface's diagonal; not told for
-    /// points without radii.
+    /// Median of `|D(c) - r|` over the spheres of the file, as a fraction of the surface's diagonal; absent for points
+    /// without radii.
     pub misfit_before: Option<f64>,
     /// The same after the similarity.
     pub misfit: Option<f64>,
@@ -144,25 +144,29 @@ const DOUBTFUL: f64 = 0.01;
 /// Largest median misfit of needed units that are exact: without a free parameter, they fit no other surface by chance.
 const FITTING: f64 = 0.05;
 
-/// Most spheres and points of the surface for a fit, evenly taken from their lists.
+/// Limit of spheres for a fit, evenly taken from their list.
 const SPHERES: usize = 4000;
+
+/// Limit of points of the surface for a fit, evenly taken from their list.
 const POINTS: usize = 1000;
 
 /// Factors between units of length: metres, centimetres, inches, decimetres or centimetres and millimetres, feet and inches.
 const FACTORS: [f64; 5] = [1000.0, 100.0, 25.4, 10.0, 12.0];
 
-/// How many times nearer to the surface a similarity must bring the union to be needed.
+/// Factor by which a similarity must bring the union nearer to the surface to be needed.
 const NEARER: f64 = 2.0;
 
-/// Steps of the optimisation; far fewer are needed where there is an optimum to be found.
+/// Limit of steps of the optimisation. Where there is an optimum, far fewer suffice.
 const STEPS: usize = 60;
 
-/// How much worse than the optimum a convention may fit to be preferred, as a factor or as a mean of `|D(c) - r|`: the optimum has four
+/// Ratio of the misfit of a convention to that of the optimum up to which the convention is preferred: the optimum has four
 /// parameters to follow the errors of the medial mesh.
 const PREFERENCE: f64 = 2.0;
+
+/// Misfit, as a mean of `|D(c) - r|`, up to which a convention is preferred to any optimum.
 const CLOSE: f64 = 0.01;
 
-/// The share of centres that must lie in the solid for units to be believed of points without radii.
+/// Least share of centres in the solid from which the units of points without radii are accepted.
 const INSIDE: f64 = 0.95;
 
 impl Shape {
@@ -390,7 +394,7 @@ impl Surface {
         spheres.par_iter().map(|s| self.residual(&similarity.sphere(s)).0).collect()
     }
 
-    /// The mean of `|D(c) - r|` in the unit of the file: in that of the surface, what is shrunk to a point of it would fit.
+    /// The mean of `|D(c) - r|` in the unit of the file. In that of the surface, spheres shrunk to one of its points would fit.
     fn mean(&self, spheres: &[Sphere], similarity: &Similarity) -> f64 {
         let sum: f64 = self.residuals(spheres, similarity).iter().map(|e| e.abs()).sum();
         sum / spheres.len().max(1) as f64 / similarity.scale

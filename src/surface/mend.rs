@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use super::check::orient_and_examine;
-use super::read::content;
+use super::format::content;
 use super::repair::repair;
 use super::report::{Fault, Repair, VertexName};
 use super::soup::PolygonSoup;

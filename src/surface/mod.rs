@@ -13,6 +13,7 @@ mod check;
 mod closest;
 mod contract;
 mod creases;
+mod format;
 mod inside;
 mod intersections;
 mod mend;
@@ -20,7 +21,6 @@ mod mesh;
 mod obj;
 mod off;
 pub(crate) mod ply;
-mod read;
 mod repair;
 mod report;
 mod sample;
@@ -37,12 +37,12 @@ use crate::Vec3;
 pub use closest::{BvhError, Closest, Feature, TriangleBvh, Vicinity};
 pub use contract::{Contraction, Folds, contract_short_edges, crust_surface};
 pub use creases::{SharpEdge, sharp_edges, smooth_normals};
+pub use format::Format;
 pub use inside::{InsideTest, Side, SignedDistance};
 pub use mend::{Components, MendOptions, mend, mend_bytes};
 #[cfg(test)]
 pub(crate) use mesh::fixtures;
 pub use mesh::{Normalisation, TriMesh, write};
-pub use read::Format;
 pub use report::{Fault, Place, Repair, SurfaceError, SurfaceReport, VertexName};
 pub use sample::{ParseSamplingError, Sampling, sample, sample_with_faces};
 pub use shrinking_ball::{Ball, End, Touched, shrinking_ball};
@@ -109,7 +109,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Loaded, SurfaceError> {
 /// When it cannot be read, or is no regular file.
 pub fn content(path: impl AsRef<Path>) -> Result<Vec<u8>, SurfaceError> {
     let path = path.as_ref();
-    read::content(path).map_err(|fault| in_file(path, fault))
+    format::content(path).map_err(|fault| in_file(path, fault))
 }
 
 /// [`read`] for the content of a file.
@@ -179,7 +179,7 @@ pub fn validate(mesh: &TriMesh) -> Result<SurfaceReport, SurfaceError> {
 }
 
 fn examine(bytes: &[u8], format: Format) -> Result<check::Examined, Fault> {
-    let repaired = repair::repair(read::parse(bytes, format)?)?;
+    let repaired = repair::repair(format::parse(bytes, format)?)?;
     Ok(check::orient_and_examine(repaired))
 }
 

@@ -12,7 +12,7 @@
 //! Each edge is evaluated once, not once for every face: the sides of a face are edges of the mesh, so
 //! a face adds only the part between its two tangent triangles. A sphere with an edge lies in the
 //! edge's cone. If several primitives have the same spheres up to rounding, only one is evaluated
-//! ([`coincident`]).
+//! ([`Distinct`]).
 
 use std::collections::HashSet;
 
