@@ -40,7 +40,9 @@ use super::bounds::{Bound, Largest, Pieces, ROUNDING, check_tolerance};
 use super::depth::{Boundary, DOUBT, Depth};
 use super::error::MetricError;
 use super::evaluation::{Certificate, Witness, WitnessSide};
-use super::pieces::{EXPOSED, Patches, Piece, burying, farthest, quartered};
+use super::pieces::{
+    EXPOSED, Patches, Piece, burying, farthest, largest_distance, planar_frames, quartered,
+};
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, NearestPrimitive};
 use crate::geometry::planar_frame::PlanarFrame;
@@ -86,10 +88,10 @@ pub fn certify(
     let mut largest = Largest::above(distance);
     let triangles = (0..surface.faces.len()).map(|face| surface.triangle(face));
     let mut side = SurfaceSide { boundary: &boundary, goal };
-    largest.divide(&mut side, triangles.clone().map(|triangle| (triangle, None)).collect())?;
+    largest.divide(&mut side, triangles.map(|triangle| (triangle, None)).collect())?;
     let mut witness =
         Witness { point: largest.witness.take().unwrap_or(point), on: WitnessSide::Surface };
-    let triangles = triangles.map(|triangle| PlanarFrame::new(triangle).0).collect();
+    let triangles = planar_frames(surface);
     let mut side = UnionSide { bvh, triangles, boundary: &boundary, goal };
     largest.divide(&mut side, boundary.patches.pieces())?;
     if let Some(point) = largest.witness {
@@ -238,7 +240,7 @@ impl Pieces for UnionSide<'_> {
         let Boundary { union, patches, .. } = self.boundary;
         let enclosure = patches.enclose(piece);
         let (centre, corners) = (enclosure.centre, enclosure.corners());
-        let reach = farthest(centre, corners);
+        let reach = enclosure.reach();
         let closest = self.bvh.closest(centre);
         let lipschitz = closest.distance + reach;
         // Cheapest exit first; it needs no look at the union, since the piece cannot raise `lower`.
@@ -246,21 +248,14 @@ impl Pieces for UnionSide<'_> {
             return Bound::above(lipschitz);
         }
         let deepest = union.deepest_or(centre, &mut 0, burying(reach));
-        // The Lipschitz bound first: it costs nothing.
-        if deepest.signed < -EXPOSED
-            && (deepest.signed + reach < -EXPOSED
-                || patches.hulls.largest_over(deepest.primitive, corners) < -EXPOSED)
-        {
+        if patches.hulls.bury(deepest, reach, corners) {
             return Bound::above(0.0);
         }
         let reached = if deepest.signed >= -EXPOSED { closest.distance } else { 0.0 };
         if lipschitz <= enough {
             return Bound { reached, at: centre, upper: lipschitz };
         }
-        let triangle = &self.triangles[closest.face as usize];
-        // The distance to one triangle is convex, so its largest value is at a corner.
-        let squared = corners.iter().map(|&corner| triangle.distance_squared(corner));
-        let convex = squared.fold(0.0, f64::max).sqrt();
+        let convex = largest_distance(&self.triangles[closest.face as usize], corners);
         Bound { reached, at: centre, upper: lipschitz.min(convex) }
     }
 

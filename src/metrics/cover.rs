@@ -556,6 +556,39 @@ mod tests {
         holds(uncovered, Vec3::new(1.0, 0.25, 0.25).length() - 0.25);
     }
 
+    /// Compares intervals with the largest of sampled distances, which fall short by less than `slack`, and checks the
+    /// witnesses.
+    fn hold_for_samples(
+        test: &CoverTest<'_>,
+        intervals: [OneSided; 2],
+        slack: f64,
+        sigma: impl Fn(Vec3) -> f64,
+        mut point: impl FnMut() -> Vec3,
+    ) {
+        let mut largest = [0.0_f64; 2];
+        for _ in 0..20_000 {
+            let p = point();
+            let (height, sigma) = (test.height(p), sigma(p));
+            if height == 0.0 {
+                largest[0] = largest[0].max(sigma);
+            }
+            if sigma <= 0.0 {
+                largest[1] = largest[1].max(height);
+            }
+        }
+        for (sampled, interval) in largest.into_iter().zip(intervals) {
+            let OneSided { upper, lower, .. } = interval;
+            assert!(sampled <= upper && sampled > lower - slack, "{sampled} {interval:?}");
+            assert!(upper - lower <= TOLERANCE, "{interval:?}");
+        }
+        let [uncovered, overshoot] = intervals;
+        let at = uncovered.witness.unwrap();
+        assert!(test.height(at) < 1e-9 && (sigma(at) - uncovered.lower).abs() < 1e-8);
+        if let Some(at) = overshoot.witness {
+            assert!(sigma(at) < 1e-9 && (test.height(at) - overshoot.lower).abs() < 1e-8);
+        }
+    }
+
     #[test]
     fn samples_never_contradict_the_intervals() {
         let mut mesh = TriMesh::default();
@@ -569,27 +602,10 @@ mod tests {
         for round in 0..6 {
             let ball = |_| Sphere::new(point(0.5), 0.02 + 0.1 * point(1.0).x.abs());
             let balls: Vec<_> = (0..10 + 8 * round).map(ball).collect();
-            let [uncovered, overshoot] = errors(&mesh, &balls, TOLERANCE);
             let sigma =
                 |p: Vec3| balls.iter().map(|b| b.signed_distance(p)).fold(f64::INFINITY, f64::min);
-            let mut largest = [0.0_f64; 2];
-            for _ in 0..20_000 {
-                let p = point(0.7);
-                if test.height(p) == 0.0 {
-                    largest[0] = largest[0].max(sigma(p));
-                }
-                if sigma(p) <= 0.0 {
-                    largest[1] = largest[1].max(test.height(p));
-                }
-            }
-            for (sampled, interval) in largest.into_iter().zip([uncovered, overshoot]) {
-                let OneSided { upper, lower, .. } = interval;
-                assert!(sampled <= upper && sampled > lower - 0.06, "{sampled} {interval:?}");
-            }
-            let at = uncovered.witness.unwrap();
-            assert!(test.height(at) < 1e-9 && (sigma(at) - uncovered.lower).abs() < 1e-8);
-            let at = overshoot.witness.unwrap();
-            assert!(sigma(at) < 1e-9 && (test.height(at) - overshoot.lower).abs() < 1e-8);
+            let intervals = errors(&mesh, &balls, TOLERANCE);
+            hold_for_samples(&test, intervals, 0.06, sigma, || point(0.7));
         }
     }
 
@@ -611,31 +627,9 @@ mod tests {
             let medial = MedialMesh::from_simplices(spheres, edges, faces).unwrap();
             let union = MedialUnion::new(&medial).unwrap();
             let intervals = test.of_union(&union, TOLERANCE).unwrap();
-            let mut largest = [0.0_f64; 2];
-            for _ in 0..20_000 {
-                let p = point(Vec3::new(0.5, 0.3, 0.15));
-                let (height, sigma) = (test.height(p), union.signed(p));
-                if height == 0.0 {
-                    largest[0] = largest[0].max(sigma);
-                }
-                if sigma <= 0.0 {
-                    largest[1] = largest[1].max(height);
-                }
-            }
-            for (k, (sampled, interval)) in largest.into_iter().zip(intervals).enumerate() {
-                let OneSided { upper, lower, .. } = interval;
-                assert!(sampled <= upper && sampled > lower - 0.03, "{sampled} {interval:?}");
-                assert!(upper - lower <= TOLERANCE, "{interval:?}");
-                positive[k] += usize::from(lower > 0.0);
-            }
-            let [uncovered, overshoot] = intervals;
-            let at = uncovered.witness.unwrap();
-            assert!(test.height(at) < 1e-9 && (union.signed(at) - uncovered.lower).abs() < 1e-8);
-            if let Some(at) = overshoot.witness {
-                assert!(
-                    union.signed(at) < 1e-9 && (test.height(at) - overshoot.lower).abs() < 1e-8
-                );
-            }
+            let around = || point(Vec3::new(0.5, 0.3, 0.15));
+            hold_for_samples(&test, intervals, 0.03, |p| union.signed(p), around);
+            intervals.iter().zip(&mut positive).for_each(|(i, n)| *n += u32::from(i.lower > 0.0));
         }
         assert!(positive.iter().all(|&count| count > 4), "{positive:?}");
     }

@@ -22,7 +22,7 @@ use rayon::prelude::*;
 
 use super::ascent::Peak;
 use super::bounds::ROUNDING;
-use super::pieces::{EXPOSED, Enclosure, Patches, Piece, burying, farthest};
+use super::pieces::{EXPOSED, Enclosure, Patches, Piece, burying};
 use crate::Vec3;
 use crate::complex::{MedialUnion, NearestPrimitive};
 use crate::geometry::trees::{PointTree, in_morton_order};
@@ -197,13 +197,9 @@ impl<'a> Boundary<'a> {
             parts.clear();
             let enclosure = self.patches.enclose(&open.piece);
             let (centre, corners) = (enclosure.centre, enclosure.corners());
-            let reach = farthest(centre, corners);
+            let reach = enclosure.reach();
             let deepest = self.union.deepest_or(centre, &mut near, burying(reach));
-            let hulls = &self.patches.hulls;
-            if deepest.signed < -EXPOSED
-                && (deepest.signed + reach < -EXPOSED
-                    || hulls.largest_over(deepest.primitive, corners) < -EXPOSED)
-            {
+            if self.patches.hulls.bury(deepest, reach, corners) {
                 continue;
             }
             if deepest.signed >= -EXPOSED && p.distance(centre) < depth.upper {
@@ -238,7 +234,7 @@ impl<'a> Boundary<'a> {
         self.initial.get_or_init(|| {
             let enclosed = self.patches.pieces().into_iter().map(|piece| {
                 let enclosure = self.patches.enclose(&piece);
-                (piece, enclosure.centre, farthest(enclosure.centre, enclosure.corners()))
+                (piece, enclosure.centre, enclosure.reach())
             });
             enclosed.collect()
         })

@@ -38,10 +38,10 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 use super::error::MetricError;
-use super::pieces::across;
+use super::pieces::{across, neighbours};
 use super::samples::Pose;
 use crate::Vec3;
-use crate::complex::{Incidence, MedialMesh, MedialUnion};
+use crate::complex::{MedialMesh, MedialUnion};
 use crate::geometry::hash::splitmix;
 use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
 
@@ -189,17 +189,7 @@ fn patches(mesh: &MedialMesh, pose: &Pose) -> Vec<Patch> {
     let of = |corners: &[u32]| {
         std::array::from_fn(|k| corners.get(k).map_or([0; 2], |&v| cells[v as usize]))
     };
-    let mut at_spheres = vec![vec![]; mesh.spheres.len()];
-    for &[a, b] in &mesh.edges {
-        at_spheres[a as usize].push(mesh.spheres[b as usize]);
-        at_spheres[b as usize].push(mesh.spheres[a as usize]);
-    }
-    let mut at_edges = vec![vec![]; mesh.edges.len()];
-    for (&[a, b, c], edges) in mesh.faces.iter().zip(Incidence::of(mesh).face_edges()) {
-        for (edge, third) in edges.iter().zip([c, b, a]) {
-            at_edges[*edge as usize].push(mesh.spheres[third as usize]);
-        }
-    }
+    let [at_spheres, at_edges] = neighbours(mesh);
     let mut patches: Vec<Patch> = (0..)
         .zip(&mesh.spheres)
         .zip(at_spheres)

@@ -6,8 +6,10 @@
 use std::f64::consts::TAU;
 
 use crate::Vec3;
-use crate::complex::{MedialMesh, Primitive};
+use crate::complex::{Incidence, MedialMesh, NearestPrimitive, Primitive};
+use crate::geometry::planar_frame::PlanarFrame;
 use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
+use crate::surface::TriMesh;
 
 /// The primitives as whole convex bodies, unlike the parts of a [`MedialUnion`](crate::complex::MedialUnion).
 pub(super) struct Hulls {
@@ -46,11 +48,45 @@ impl Hulls {
         // A convex function is largest over a convex hull at one of its corners.
         corners.iter().fold(f64::NEG_INFINITY, |largest, &p| largest.max(self.signed(primitive, p)))
     }
+
+    /// Whether a primitive contains a convex polytope, by the signed distance at a point that is within `reach` of it.
+    pub fn bury(&self, at: NearestPrimitive, reach: f64, corners: &[Vec3]) -> bool {
+        // The Lipschitz bound first: it costs nothing.
+        at.signed < -EXPOSED
+            && (at.signed + reach < -EXPOSED || self.largest_over(at.primitive, corners) < -EXPOSED)
+    }
 }
 
 /// The distance from a point to the farthest of some others.
 pub(super) fn farthest(from: Vec3, points: &[Vec3]) -> f64 {
     points.iter().fold(0.0, |far, &p| f64::max(far, from.distance_squared(p))).sqrt()
+}
+
+/// The largest distance to a triangle over the convex hull of some points.
+pub(super) fn largest_distance(triangle: &PlanarFrame, corners: &[Vec3]) -> f64 {
+    // The distance is convex.
+    corners.iter().map(|&corner| triangle.distance_squared(corner)).fold(0.0, f64::max).sqrt()
+}
+
+/// The triangles of a surface.
+pub(super) fn planar_frames(surface: &TriMesh) -> Vec<PlanarFrame> {
+    (0..surface.faces.len()).map(|face| PlanarFrame::new(surface.triangle(face)).0).collect()
+}
+
+/// For each sphere the other ends of its edges, and for each edge the third corners of its faces.
+pub(super) fn neighbours(mesh: &MedialMesh) -> [Vec<Vec<Sphere>>; 2] {
+    let mut at_spheres = vec![vec![]; mesh.spheres.len()];
+    for &[a, b] in &mesh.edges {
+        at_spheres[a as usize].push(mesh.spheres[b as usize]);
+        at_spheres[b as usize].push(mesh.spheres[a as usize]);
+    }
+    let mut at_edges = vec![vec![]; mesh.edges.len()];
+    for (&[a, b, c], edges) in mesh.faces.iter().zip(Incidence::of(mesh).face_edges()) {
+        for (edge, third) in edges.iter().zip([c, b, a]) {
+            at_edges[*edge as usize].push(mesh.spheres[third as usize]);
+        }
+    }
+    [at_spheres, at_edges]
 }
 
 /// A triangle in four, by the midpoints of its sides.
@@ -256,6 +292,11 @@ impl Enclosure {
             enclosure.count += 1;
         }
         enclosure
+    }
+
+    /// The distance from the centre within which the piece is.
+    pub fn reach(&self) -> f64 {
+        farthest(self.centre, self.corners())
     }
 
     pub fn corners(&self) -> &[Vec3] {

@@ -18,10 +18,12 @@ use super::ascent::{Hill, Peak, Start, ascend};
 use super::bounds::{Bound, Largest, Pieces};
 use super::depth::{Boundary, DOUBT};
 use super::pieces::{
-    EXPOSED, Patches, Piece, SECTORS, burying, farthest, lateral_normal, quartered,
+    EXPOSED, Patches, Piece, SECTORS, burying, farthest, largest_distance, lateral_normal,
+    neighbours, planar_frames, quartered,
 };
 use crate::Vec3;
-use crate::complex::{Incidence, MedialUnion, Primitive};
+use crate::complex::{MedialUnion, Primitive};
+use crate::geometry::Sphere;
 use crate::geometry::planar_frame::PlanarFrame;
 use crate::surface::{TriMesh, TriangleBvh};
 
@@ -213,10 +215,8 @@ struct SweptUnion<'a> {
     triangles: Vec<PlanarFrame>,
     union: &'a MedialUnion,
     patches: &'a Patches<'a>,
-    /// The ends of the edges at each sphere.
-    neighbours: Vec<Vec<u32>>,
-    /// The third corners of the faces at each edge.
-    opposite: Vec<Vec<u32>>,
+    /// For each sphere the other ends of its edges, and for each edge the third corners of its faces.
+    neighbours: [Vec<Vec<Sphere>>; 2],
 }
 
 /// A piece, the face that is closest to it and the primitive that is deepest there.
@@ -225,22 +225,8 @@ type Hinted = (Piece, Option<(u32, Primitive)>);
 impl<'a> SweptUnion<'a> {
     pub fn new((surface, bvh): (&TriMesh, &'a TriangleBvh), boundary: &'a Boundary<'a>) -> Self {
         let Boundary { union, patches, .. } = boundary;
-        let mesh = patches.mesh;
-        let faces = 0..surface.faces.len();
-        let triangles = faces.map(|f| PlanarFrame::new(surface.triangle(f)).0).collect();
-        let mut neighbours = vec![Vec::new(); mesh.spheres.len()];
-        for &[a, b] in &mesh.edges {
-            neighbours[a as usize].push(b);
-            neighbours[b as usize].push(a);
-        }
-        let mut opposite = vec![Vec::new(); mesh.edges.len()];
-        let incidence = Incidence::of(mesh);
-        for (&[a, b, c], sides) in mesh.faces.iter().zip(incidence.face_edges()) {
-            for (edge, corner) in sides.iter().zip([c, b, a]) {
-                opposite[*edge as usize].push(corner);
-            }
-        }
-        Self { bvh, triangles, union, patches, neighbours, opposite }
+        let neighbours = neighbours(patches.mesh);
+        Self { bvh, triangles: planar_frames(surface), union, patches, neighbours }
     }
 
     /// The initial pieces. Laterals are cut where a face begins or ends to overtop them.
@@ -277,17 +263,18 @@ impl<'a> SweptUnion<'a> {
 
     /// The spheres that can reach farther than a curved piece.
     fn others(&self, piece: &Piece) -> impl Iterator<Item = Other> {
-        let (sphere, others): (_, &[u32]) = match *piece {
+        let [at_spheres, at_edges] = &self.neighbours;
+        let (sphere, others): (_, &[Sphere]) = match *piece {
             Piece::Flat(_) => (0, &[]),
-            Piece::Round(v, _) => (v, &self.neighbours[v as usize]),
+            Piece::Round(v, _) => (v, &at_spheres[v as usize]),
             Piece::Lateral(e, ..) => {
-                (self.patches.mesh.edges[e as usize][0], &self.opposite[e as usize])
+                (self.patches.mesh.edges[e as usize][0], &at_edges[e as usize])
             }
         };
         let own = self.patches.sphere(sphere);
-        others.iter().map(move |&v| {
-            let other = self.patches.sphere(v);
-            Other { way: other.centre - own.centre, growth: other.radius - own.radius }
+        others.iter().map(move |other| Other {
+            way: other.centre - own.centre,
+            growth: other.radius - own.radius,
         })
     }
 
@@ -320,7 +307,7 @@ impl Surface for SweptUnion<'_> {
         }
         let enclosure = self.patches.enclose(piece);
         let (centre, corners) = (enclosure.centre, enclosure.corners());
-        let reach = farthest(centre, corners);
+        let reach = enclosure.reach();
         if let Piece::Round(_, [a, b, c]) = *piece
             && reach > COARSE * enough
             && self.is_overtopped(piece, &[(a + b + c).normalize()])
@@ -328,15 +315,10 @@ impl Surface for SweptUnion<'_> {
             // Too large for a bound by its distance, and buried.
             return Some(Bound::above(f64::INFINITY));
         }
-        let is_buried_in =
-            |primitive| self.patches.hulls.largest_over(primitive, corners) < -EXPOSED;
-        // The distance to one triangle is convex, so its largest value is at a corner.
-        let from_face = |face: u32| {
-            let triangle = &self.triangles[face as usize];
-            corners.iter().map(|&c| triangle.distance_squared(c)).fold(0.0, f64::max).sqrt()
-        };
+        let from_face = |face: u32| largest_distance(&self.triangles[face as usize], corners);
         if let Some((face, primitive)) = *hint
-            && (is_buried_in(primitive) || from_face(face) <= enough)
+            && (self.patches.hulls.largest_over(primitive, corners) < -EXPOSED
+                || from_face(face) <= enough)
         {
             return None;
         }
@@ -350,12 +332,11 @@ impl Surface for SweptUnion<'_> {
             return None;
         }
         let deepest = self.union.deepest_or(centre, &mut near.place, burying(reach));
-        let signed = deepest.signed;
-        if signed < -EXPOSED && (signed + reach < -EXPOSED || is_buried_in(deepest.primitive)) {
+        if self.patches.hulls.bury(deepest, reach, corners) {
             return None;
         }
         *hint = Some((closest.face, deepest.primitive));
-        let reached = if signed >= -EXPOSED { distance } else { 0.0 };
+        let reached = if deepest.signed >= -EXPOSED { distance } else { 0.0 };
         Some(Bound { at: centre, reached, upper })
     }
 
