@@ -28,6 +28,7 @@ pub mod diff;
 mod differences;
 pub mod drawing;
 pub mod editions;
+mod error;
 mod header;
 pub mod history;
 mod metric;
@@ -43,6 +44,7 @@ mod tables;
 mod view3d;
 mod write;
 
+pub use error::ReportError;
 pub use header::{Header, MethodNote, RunNote, Running};
 pub use metric::{Better, METRICS, Metric, measured_rows};
 pub use overview::{reasons, summary_text};
@@ -50,7 +52,7 @@ pub use pictures::{PictureStrip, picture_strips};
 pub use site::write_site;
 pub use tables::without_markup;
 pub use view3d::View3d;
-pub use write::{ReportError, read_header, results_csv, write_report};
+pub use write::{read_header, results_csv, write_report};
 
 #[cfg(doctest)]
 #[doc = include_str!("README.md")]

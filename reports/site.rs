@@ -15,7 +15,8 @@ use crate::header::{Header, MethodNote, method_pages};
 use crate::metric::{HAUSDORFF, MEAN_ERROR, MIN_ANGLE, TOTAL_SECONDS};
 use crate::pictures::strips;
 use crate::tables::{Cell, Table, mesh_table, to_html, topology_word};
-use crate::write::{Files, ReportError, write_report};
+use crate::error::ReportError;
+use crate::write::{Files, write_report};
 
 /// Writes the site of some records into a folder: the report without medial meshes, and further pages. Pictures and 3D views
 /// are copied from the report in `store`. Returns the files.

@@ -15,6 +15,7 @@ use medial_run::text::file_stems;
 use crate::answers::{by_bound, equal_error_table, purpose_table};
 use crate::comparison::Comparison;
 use crate::differences::{difference_tables, differences_csv};
+use crate::error::ReportError;
 use crate::header::Header;
 use crate::overview::overview_table;
 use crate::page::{MeshPart, MeshView, Page, gzip};
@@ -214,33 +215,6 @@ pub fn read_header(dir: &Path) -> Result<Header, ReportError> {
         header.map_err(|error| io::Error::other(parser_message(&error.to_string())))
     };
     read_regular(&path).and_then(read).map_err(|source| ReportError::Io { path, source })
-}
-
-/// Why a report could not be written.
-#[derive(Debug, thiserror::Error)]
-pub enum ReportError {
-    /// Reading or writing failed.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// The system's message.
-        source: io::Error,
-    },
-    /// A file could not be made from the records.
-    #[error("{what}: cannot be made ({message})")]
-    Content {
-        /// The file.
-        what: &'static str,
-        /// The cause.
-        message: String,
-    },
-}
-
-impl ReportError {
-    pub(crate) fn content(what: &'static str, error: impl Display) -> Self {
-        Self::Content { what, message: error.to_string() }
-    }
 }
 
 /// The folder of the report and the written files.

@@ -1,7 +1,7 @@
 //! Every metric of one medial mesh of a surface.
 
 use medial::complex::MedialMesh;
-use medial::metrics::{Evaluation, Judge, MetricError, sheet_difference};
+use medial::metrics::{Evaluation, Judge, MetricError};
 use medial::shape::Shape;
 
 /// A shape, and the measurements of medial meshes of it.
@@ -27,14 +27,14 @@ impl Evaluator<'_> {
     pub fn evaluate(&self, mesh: &MedialMesh) -> Result<Evaluation, MetricError> {
         let units = self.shape.normalisation();
         let normal =
-            |mesh: &MedialMesh| mesh.transformed(1.0 / units.diagonal, |p| units.forward(p));
+            |mesh: &MedialMesh| mesh.to_normal(units);
         let mesh = normal(mesh);
         let mesh = if self.spheres_alone { mesh.spheres_alone() } else { mesh };
         let mut evaluation = self.judge.evaluate_certified(&mesh, self.certify)?;
         // Points are looked for in the surface file.
         evaluation.move_witnesses(|point| units.backward(point));
         if let (Some(reference), Some(structure)) = (self.reference, &mut evaluation.structure) {
-            structure.known = Some(sheet_difference(&mesh, &normal(reference))?);
+            structure.known = Some(self.judge.sheet_difference(&mesh, &normal(reference))?);
         }
         Ok(evaluation)
     }

@@ -137,7 +137,7 @@ pub fn power_crust(
     let balls = shape.polar_balls()?;
     let units = shape.normalisation();
     let inner = match axis {
-        Some(axis) => axis.transformed(1.0 / units.diagonal, |p| units.forward(p)).spheres,
+        Some(axis) => axis.to_normal(units).spheres,
         None => balls.inner,
     };
     let crust = PowerCrust::new(&inner, &balls.outer)?;

@@ -151,7 +151,7 @@ impl Scene {
     /// A result in the units of the input.
     pub fn in_input_units(&self, mesh: &MedialMesh) -> MedialMesh {
         let back = self.shape().normalisation();
-        mesh.transformed(back.diagonal, |p| back.backward(p))
+        mesh.to_input(back)
     }
 }
 

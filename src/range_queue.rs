@@ -49,8 +49,8 @@ impl<T: Ord + Copy> RangeQueue<T> {
         }
     }
 
-    /// Removes the least item that is up to date. `present` gives for an item what it has become: the same, a
-    /// larger one, or nothing.
+    /// Removes the least item that is up to date. `present` returns for an item its present form: the same, a
+    /// larger one, or none.
     pub fn pop(&mut self, present: impl Fn(T) -> Option<T>) -> Option<T> {
         loop {
             while let Some(Reverse(item)) = self.lowest.pop() {

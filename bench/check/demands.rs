@@ -479,7 +479,7 @@ pub(super) fn given_initial(subject: &Subject<'_>) -> CaseResult {
     let initial = shape.view().initial().map_err(|error| Outcome::Skipped(error.to_string()))?;
     let plain = MedialMesh { contacts: None, ..(*initial).clone() };
     let back = *shape.normalisation();
-    let plain = plain.transformed(back.diagonal, |p| back.backward(p));
+    let plain = plain.to_input(&back);
     let shape = corpus_shape("capsule").with_initial(&plain);
     let level = Level::Spheres(50);
     (subject.doing)("50 spheres from a given medial mesh of the capsule");
@@ -556,7 +556,7 @@ fn two(one: &TriMesh) -> TriMesh {
 /// A surface of the words of an OFF file behind its first.
 fn solid(words: &str) -> TriMesh {
     let text = format!("OFF {words}");
-    let loaded = surface::read_any(Path::new("solid.off"), text.as_bytes());
+    let loaded = surface::inspect(Path::new("solid.off"), text.as_bytes());
     loaded.expect("the solids of the corpus are surfaces").mesh
 }
 

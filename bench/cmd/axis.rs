@@ -45,7 +45,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let mut lost = None;
     if let Some(output) = &arguments.output {
         let back = shape.normalisation();
-        let mesh = mesh.transformed(back.diagonal, |p| back.backward(p));
+        let mesh = mesh.to_input(back);
         complex::write(output, &mesh).map_err(Failure::input)?;
         lost = left_out(output, &mesh);
     }

@@ -122,7 +122,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         let (mesh, notes) = read_axis(path, &shape, arguments.fitting.into())?.0.with_remarks();
         warnings.extend(notes);
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        axes.push((name, mesh.transformed(1.0 / units.diagonal, |p| units.forward(p))));
+        axes.push((name, mesh.to_normal(units)));
     }
     let drawn = drawing.draw(&shape, &axes, &|stage| line.at(stage)).map_err(failed)?;
     let Drawn { png, width, height, direction, up, errors, seconds } = drawn;

@@ -105,7 +105,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     line.at("writing");
     if let Some(path) = &arguments.output {
         let units = shape.normalisation();
-        let mesh = result.mesh.transformed(units.diagonal, |p| units.backward(p));
+        let mesh = result.mesh.to_input(units);
         complex::write(path, &mesh).map_err(Failure::input)?;
         warnings.extend(left_out(path, &mesh));
     }

@@ -137,7 +137,7 @@ impl MedialSimplifier for External {
             surface::write(&files[0], &mesh).map_err(|error| cannot("write {surface}", error))?;
         }
         if let Some(initial) = initial {
-            let mesh = initial.transformed(back.diagonal, |p| back.backward(p));
+            let mesh = initial.to_input(back);
             complex::write(&files[1], &mesh).map_err(|error| cannot("write {initial}", error))?;
         }
         for (name, path) in ["surface", "initial"].into_iter().zip(files) {
@@ -286,7 +286,7 @@ impl PreparedProgram<'_> {
         }
         reach(&loaded.mesh, self.shape).map_err(SimplifyError::InvalidOutput)?;
         let normal = self.shape.normalisation();
-        let mesh = loaded.mesh.transformed(1.0 / normal.diagonal, |p| normal.forward(p));
+        let mesh = loaded.mesh.to_normal(normal);
         // The reader repairs lists, and the check refuses all other defects.
         mesh.check()?;
         Ok((mesh, loaded.notes))

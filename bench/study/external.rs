@@ -293,7 +293,7 @@ fn prepare<'s>(
         remarks.push(format!("has the same bytes as {same_as}"));
     }
     let units = *shape.normalisation();
-    let mesh = mesh.transformed(1.0 / units.diagonal, |p| units.forward(p));
+    let mesh = mesh.to_normal(&units);
     Ok(Box::new(move |level: Level| {
         let spheres = mesh.spheres.len();
         match level {

@@ -72,7 +72,7 @@ impl Axis {
 
 /// A medial mesh of normalised units in those of the input.
 pub fn in_input_units(mesh: &MedialMesh, units: &Normalisation) -> MedialMesh {
-    mesh.transformed(units.diagonal, |point| units.backward(point))
+    mesh.to_input(units)
 }
 
 /// Contact samples and their indices, words of the shape's options, whether it is the initial medial mesh.

@@ -80,7 +80,7 @@ pub fn render<'py>(
         let shape = model.shape(&ShapeOptions::default())?;
         let units = *shape.normalisation();
         let normal =
-            |mesh: &MedialMesh| mesh.transformed(1.0 / units.diagonal, |p| units.forward(p));
+            |mesh: &MedialMesh| mesh.to_normal(&units);
         let axes: Vec<_> = axes.into_iter().map(|(name, mesh)| (name, normal(&mesh))).collect();
         let drawn = drawing.draw(&shape, &axes, &|stage| monitor.at(stage));
         let drawn = drawn.map_err(|error: DrawError| {

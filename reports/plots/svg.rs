@@ -14,7 +14,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::axis::{Axis, Scale};
 use super::{Curve, Figure, Point};
-use crate::write::ReportError;
+use crate::error::ReportError;
 
 /// The backend draws at whole pixels: a large drawing keeps circles and slopes smooth at any size.
 const WIDTH: i32 = 1280;

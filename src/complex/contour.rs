@@ -5,8 +5,8 @@
 //!
 //! 1. A cube around the union is filled with tetrahedra. Those that may meet the boundary, judged by
 //!    `sigma` at their vertices, are bisected until no edge is longer than 4/5 of the tolerance, or
-//!    than the radius of the union's balls there if that is less (file `bisection.rs`).
-//! 2. Marching tetrahedra: a closed manifold with its vertices on the boundary (file `march.rs`).
+//!    than the radius of the union's balls there if that is less.
+//! 2. Marching tetrahedra: a closed manifold with its vertices on the boundary.
 //! 3. Edges shorter than a quarter of the tetrahedron's edge are contracted: a closed manifold stays one,
 //!    and vertices stay on the boundary ([`contract_short_edges`]).
 //!

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use crate::Vec3;
 use crate::geometry::{Sphere, TriangleTree, triangles_cross};
+use crate::surface::Normalisation;
 
 /// The boundary samples that each sphere touches, from the triangulation that it was made of.
 #[derive(Clone, Debug, PartialEq)]
@@ -238,6 +239,16 @@ impl MedialMesh {
                 of_sphere: order.iter().map(|&v| c.of_sphere[v as usize]).collect(),
             }),
         }
+    }
+
+    /// A mesh in input units, in those of the normalised surface.
+    pub fn to_normal(&self, units: &Normalisation) -> Self {
+        self.transformed(1.0 / units.diagonal, |p| units.forward(p))
+    }
+
+    /// A mesh in units of the normalised surface, in input units.
+    pub fn to_input(&self, units: &Normalisation) -> Self {
+        self.transformed(units.diagonal, |p| units.backward(p))
     }
 
     /// The mesh with every sphere (and contact sample) carried through `map`, a similarity that
@@ -541,7 +552,7 @@ impl Crossings {
         self.pairs_with(|_| true)
     }
 
-    /// The pairs that cross and have a face for which `is_asked`, ascending.
+    /// The pairs that cross and have a face for which `is_asked` holds, ascending.
     pub fn pairs_with(&self, is_asked: impl Fn(u32) -> bool + Sync) -> Vec<[u32; 2]> {
         let mut pairs: Vec<[u32; 2]> = (0..self.tree.len())
             .into_par_iter()

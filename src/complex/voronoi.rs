@@ -164,8 +164,7 @@ impl CellSpheres {
         self.is_inside.get(cell.index()).is_some_and(|&inside| inside)
     }
 
-    /// For each of so many cells the sphere of the Voronoi medial mesh that it is, or the largest
-    /// id.
+    /// For each of `cells` cells its sphere of the Voronoi medial mesh, or the largest id.
     pub(super) fn sphere_ids(&self, cells: usize) -> Vec<u32> {
         let mut ids = vec![u32::MAX; cells];
         for (sphere, cell) in (0..).zip(&self.kept) {

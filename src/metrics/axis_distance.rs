@@ -19,8 +19,9 @@ use std::ops::Range;
 use glam::DVec4;
 use rayon::prelude::*;
 
+use super::error::MetricError;
+use super::evaluation::{AxisDistances, AxisSpan, SheetCoverage};
 use super::samples::{Placed, place_on_triangles};
-use super::{AxisDistances, AxisSpan, MetricError, SheetCoverage};
 use crate::Vec3;
 use crate::complex::{Incidence, MedialMesh, Sphere, UnionError};
 use crate::geometry::DisjointSets;

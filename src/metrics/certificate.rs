@@ -35,64 +35,25 @@
 //! Rounding: all of this is double precision, whose errors, at coordinates of the order of the
 //! surface's diagonal, are below [`ROUNDING`] diagonals. The interval is wider by that on both sides.
 
-use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
-
-use super::MetricError;
 use super::ascent::Peak;
+use super::bounds::{Bound, Largest, Pieces, ROUNDING, check_tolerance};
 use super::depth::{Boundary, DOUBT, Depth};
-use super::pieces::{EXPOSED, Patches, Piece, burying, farthest, quartered};
+use super::error::MetricError;
+use super::evaluation::{Certificate, Witness, WitnessSide};
+use super::pieces::{
+    EXPOSED, Patches, Piece, burying, farthest, largest_distance, planar_frames, quartered,
+};
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, NearestPrimitive};
 use crate::geometry::planar_frame::PlanarFrame;
 use crate::geometry::trees::in_morton_order;
 use crate::surface::{TriMesh, TriangleBvh};
 
-/// Bound on the rounding error of a distance, in units of the surface's diagonal.
-pub const ROUNDING: f64 = 1e-9;
-
-/// Finer intervals than this, in diagonals, are rejected: rounding would be a part of them.
-pub const FINEST: f64 = 1e-6;
-
-/// Bounds on the pieces of a round for small inputs and for any: about 0.7 and 2 GB.
+/// Limits of pieces of a round for small and for large inputs: about 0.7 and 2 GB.
 const MAX_PIECES: [usize; 2] = [1 << 22, 1 << 24];
 
-/// Between these bounds, the pieces of a round for each piece to begin with.
+/// Limit of pieces of a round for each initial piece, between the two of [`MAX_PIECES`].
 const MAX_GROWTH: usize = 64;
-
-/// An interval that holds the Hausdorff distance between a surface and the boundary of a union.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Certificate {
-    /// A lower bound: the distance at the witness, less the bound on rounding.
-    pub lower: f64,
-    /// An upper bound.
-    pub upper: f64,
-    /// The requested bound on `upper - lower`.
-    pub tolerance: f64,
-    /// Number of pieces that were evaluated.
-    pub pieces: u64,
-    /// A point at which the distance is `lower`, up to rounding.
-    pub witness: Witness,
-}
-
-/// A point on one of the two surfaces, by which the lower end of an interval can be checked.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Witness {
-    /// Where it is.
-    pub point: Vec3,
-    /// The surface that it is on.
-    pub on: WitnessSide,
-}
-
-/// The surface that a [`Witness`] is on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum WitnessSide {
-    /// The surface, where `|sigma|` is the distance.
-    Surface,
-    /// The boundary of the union, whose distance to the surface it is.
-    Union,
-}
 
 /// Encloses the Hausdorff distance in an interval no wider than `tolerance`, in the unit of both,
 /// for a surface of diagonal about 1. The same for any number of threads.
@@ -101,7 +62,7 @@ pub enum WitnessSide {
 /// the distance is within one tolerance of its maximum.
 ///
 /// # Errors
-/// A tolerance below [`FINEST`] or not a number; an interval that would need too many pieces; a
+/// A tolerance below [`FINEST`](super::FINEST) or not a number; an interval that would need too many pieces; a
 /// medial mesh without a union; a surface without faces.
 pub fn certify(
     surface: &TriMesh,
@@ -109,9 +70,7 @@ pub fn certify(
     mesh: &MedialMesh,
     tolerance: f64,
 ) -> Result<Certificate, MetricError> {
-    if !(FINEST..=1.0).contains(&tolerance) {
-        return Err(MetricError::Tolerance(tolerance));
-    }
+    check_tolerance(tolerance)?;
     if surface.faces.is_empty() {
         return Err(MetricError::NoArea);
     }
@@ -120,100 +79,42 @@ pub fn certify(
     // Both ends are widened by ROUNDING below; half of one more covers the rounding of these sums.
     let goal = tolerance - 2.5 * ROUNDING;
     // A good lower bound before the first piece is divided: the maximum is often at a vertex.
-    let witness = Witness { point: surface.vertices[0], on: WitnessSide::Surface };
-    let mut search = Search { lower: 0.0, witness, upper: 0.0, goal, pieces: 0 };
     let depths = in_morton_order(&surface.vertices, |near, p| boundary.of(p, near).upper);
     let vertices = surface.vertices.iter().zip(depths);
     let vertices = vertices.map(|(&point, distance)| Peak { point, distance }).collect();
-    if let Some(Peak { point, distance }) = boundary.deepest_of(vertices) {
-        (search.lower, search.witness.point) = (distance, point);
-    }
+    let deepest = boundary.deepest_of(vertices);
+    let Peak { point, distance } =
+        deepest.unwrap_or(Peak { point: surface.vertices[0], distance: 0.0 });
+    let mut largest = Largest::above(distance);
     let triangles = (0..surface.faces.len()).map(|face| surface.triangle(face));
-    let side = SurfaceSide { boundary: &boundary, goal };
-    search.run(&side, triangles.clone().map(|triangle| (triangle, None)).collect())?;
-    let triangles = triangles.map(|triangle| PlanarFrame::new(triangle).0).collect();
-    let side = UnionSide { bvh, triangles, boundary: &boundary };
-    search.run(&side, boundary.patches.pieces())?;
+    let mut side = SurfaceSide { boundary: &boundary, goal };
+    largest.divide(&mut side, triangles.map(|triangle| (triangle, None)).collect())?;
+    let mut witness =
+        Witness { point: largest.witness.take().unwrap_or(point), on: WitnessSide::Surface };
+    let triangles = planar_frames(surface);
+    let mut side = UnionSide { bvh, triangles, boundary: &boundary, goal };
+    largest.divide(&mut side, boundary.patches.pieces())?;
+    if let Some(point) = largest.witness {
+        witness = Witness { point, on: WitnessSide::Union };
+    }
     Ok(Certificate {
-        lower: (search.lower - ROUNDING).max(0.0),
-        upper: search.upper.max(search.lower) + ROUNDING,
+        lower: (largest.lower - ROUNDING).max(0.0),
+        upper: largest.upper.max(largest.lower) + ROUNDING,
         tolerance,
-        pieces: search.pieces,
-        witness: search.witness,
+        pieces: largest.pieces,
+        witness,
     })
 }
 
-/// Distances on one of the two surfaces to the other.
-pub(super) trait Side: Sync {
-    /// A part of this surface.
-    type Piece: Copy + Send + Sync;
-
-    /// The surface that this is.
-    const SIDE: WitnessSide;
-
-    /// Bounds of the distances in a piece. The distance `known` is reached somewhere already; an upper
-    /// bound below `enough` need not be improved.
-    fn bound(&self, piece: &mut Self::Piece, known: f64, enough: f64) -> Bound;
-
-    /// Appends pieces that together cover a piece.
-    fn divide(&self, piece: &Self::Piece, parts: &mut Vec<Self::Piece>);
-}
-
-/// Bounds of the largest distance in a piece.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bound {
-    /// The distance at `centre`; 0 if that point is not known to be on the surface.
-    reached: f64,
-    /// A point of the piece.
-    centre: Vec3,
-    /// No distance in the piece exceeds it.
-    upper: f64,
-}
-
-/// The state of the branch and bound.
-struct Search {
-    lower: f64,
-    /// The point at which `lower` is reached.
-    witness: Witness,
-    upper: f64,
-    goal: f64,
-    pieces: u64,
-}
-
-impl Search {
-    fn run<S: Side>(&mut self, side: &S, mut pieces: Vec<S::Piece>) -> Result<(), MetricError> {
+impl Largest {
+    fn divide<P: Pieces>(
+        &mut self,
+        side: &mut P,
+        pieces: Vec<P::Piece>,
+    ) -> Result<(), MetricError> {
         // A few bytes of input must not take minutes before they are rejected.
         let most = (MAX_GROWTH * pieces.len()).clamp(MAX_PIECES[0], MAX_PIECES[1]);
-        while !pieces.is_empty() {
-            self.pieces += pieces.len() as u64;
-            let (known, enough) = (self.lower, self.lower + self.goal);
-            let bounds: Vec<Bound> = pieces
-                .par_iter_mut()
-                .with_min_len(64)
-                .map(|piece| side.bound(piece, known, enough))
-                .collect();
-            // In the order of the pieces, and only now: `lower` must not depend on threads.
-            for bound in &bounds {
-                if bound.reached > self.lower {
-                    self.lower = bound.reached;
-                    self.witness = Witness { point: bound.centre, on: S::SIDE };
-                }
-            }
-            let enough = self.lower + self.goal;
-            let mut parts = Vec::new();
-            for (piece, bound) in pieces.iter().zip(&bounds) {
-                if bound.upper <= enough {
-                    self.upper = self.upper.max(bound.upper);
-                } else {
-                    side.divide(piece, &mut parts);
-                    if parts.len() > most {
-                        return Err(MetricError::TooFine { tolerance: self.goal, pieces: most });
-                    }
-                }
-            }
-            pieces = parts;
-        }
-        Ok(())
+        self.search(side, pieces, most)
     }
 }
 
@@ -259,13 +160,22 @@ impl SurfaceSide<'_> {
     }
 }
 
-impl Side for SurfaceSide<'_> {
+impl Pieces for SurfaceSide<'_> {
     /// A triangle, and a point outside the union that was near to the triangle that it is a part of.
     type Piece = ([Vec3; 3], Option<Vec3>);
+    type Near = ();
 
-    const SIDE: WitnessSide = WitnessSide::Surface;
+    fn enough(&self, lower: f64) -> f64 {
+        lower + self.goal
+    }
 
-    fn bound(&self, (triangle, outside): &mut Self::Piece, _: f64, enough: f64) -> Bound {
+    fn bound(
+        &self,
+        (triangle, outside): &mut Self::Piece,
+        _: f64,
+        enough: f64,
+        (): &mut (),
+    ) -> Bound {
         let centre = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
         let reach = farthest(centre, triangle);
         let mut near = 0;
@@ -279,7 +189,7 @@ impl Side for SurfaceSide<'_> {
             }
         }
         if depth.upper + reach <= enough {
-            return Bound { reached, centre, upper: depth.upper + reach };
+            return Bound { reached, at: centre, upper: depth.upper + reach };
         }
         let above = self.above(triangle, enough, deepest).min(deepest.signed + reach);
         if above <= enough {
@@ -291,7 +201,7 @@ impl Side for SurfaceSide<'_> {
             let way = enough * way.normalize_or_zero();
             let [moved @ .., at] = [triangle[0], triangle[1], triangle[2], centre].map(|p| p + way);
             if to_outside <= enough || self.is_outside(&moved, at, reach) {
-                return Bound { reached, centre, upper: above.max(enough.min(to_outside)) };
+                return Bound { reached, at: centre, upper: above.max(enough.min(to_outside)) };
             }
         }
         if depth.upper - depth.lower > DOUBT * reach.max(self.goal) {
@@ -300,7 +210,7 @@ impl Side for SurfaceSide<'_> {
         if deepest.signed < 0.0 && depth.upper.is_finite() {
             *outside = Some(depth.outside);
         }
-        Bound { reached: depth.lower, centre, upper: depth.upper + reach }
+        Bound { reached: depth.lower, at: centre, upper: depth.upper + reach }
     }
 
     fn divide(&self, (triangle, outside): &Self::Piece, parts: &mut Vec<Self::Piece>) {
@@ -315,41 +225,38 @@ struct UnionSide<'a> {
     bvh: &'a TriangleBvh,
     triangles: Vec<PlanarFrame>,
     boundary: &'a Boundary<'a>,
+    goal: f64,
 }
 
-impl Side for UnionSide<'_> {
+impl Pieces for UnionSide<'_> {
     type Piece = Piece;
+    type Near = ();
 
-    const SIDE: WitnessSide = WitnessSide::Union;
+    fn enough(&self, lower: f64) -> f64 {
+        lower + self.goal
+    }
 
-    fn bound(&self, piece: &mut Piece, known: f64, enough: f64) -> Bound {
+    fn bound(&self, piece: &mut Piece, known: f64, enough: f64, (): &mut ()) -> Bound {
         let Boundary { union, patches, .. } = self.boundary;
         let enclosure = patches.enclose(piece);
         let (centre, corners) = (enclosure.centre, enclosure.corners());
-        let reach = farthest(centre, corners);
+        let reach = enclosure.reach();
         let closest = self.bvh.closest(centre);
         let lipschitz = closest.distance + reach;
         // Cheapest exit first; it needs no look at the union, since the piece cannot raise `lower`.
         if lipschitz <= enough && closest.distance <= known {
-            return Bound { reached: 0.0, centre, upper: lipschitz };
+            return Bound::above(lipschitz);
         }
         let deepest = union.deepest_or(centre, &mut 0, burying(reach));
-        // The Lipschitz bound first: it costs nothing.
-        if deepest.signed < -EXPOSED
-            && (deepest.signed + reach < -EXPOSED
-                || patches.hulls.largest_over(deepest.primitive, corners) < -EXPOSED)
-        {
-            return Bound { reached: 0.0, centre, upper: 0.0 };
+        if patches.hulls.bury(deepest, reach, corners) {
+            return Bound::above(0.0);
         }
         let reached = if deepest.signed >= -EXPOSED { closest.distance } else { 0.0 };
         if lipschitz <= enough {
-            return Bound { reached, centre, upper: lipschitz };
+            return Bound { reached, at: centre, upper: lipschitz };
         }
-        let triangle = &self.triangles[closest.face as usize];
-        // The distance to one triangle is convex, so its largest value is at a corner.
-        let squared = corners.iter().map(|&corner| triangle.distance_squared(corner));
-        let convex = squared.fold(0.0, f64::max).sqrt();
-        Bound { reached, centre, upper: lipschitz.min(convex) }
+        let convex = largest_distance(&self.triangles[closest.face as usize], corners);
+        Bound { reached, at: centre, upper: lipschitz.min(convex) }
     }
 
     fn divide(&self, piece: &Piece, parts: &mut Vec<Piece>) {

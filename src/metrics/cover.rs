@@ -37,9 +37,10 @@
 //! [`SMALLEST`]: where the margin is smaller than about that, the interval ends at a positive number.
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-use super::{FINEST, MetricError, ROUNDING};
+use super::bounds::{Bound, Largest, Pieces, ROUNDING, check_tolerance};
+use super::error::MetricError;
+use super::evaluation::OneSided;
 use crate::Vec3;
 use crate::complex::{MedialUnion, UnionError};
 use crate::geometry::Sphere;
@@ -49,32 +50,20 @@ use crate::surface::{Closest, InsideTest, Side, TriMesh, TriangleBvh};
 /// Half diagonal of the smallest cubes that a proof of zero divides, in diagonals of the surface.
 pub const SMALLEST: f64 = 1e-6;
 
-/// Cubes of a round up to which a proof of zero goes on.
+/// Number of cubes of a round above which a proof of zero is given up.
 const MOST_FOR_ZERO: usize = 1 << 19;
 
 /// The same for a medial mesh, which seldom contains a solid or fits into it.
 const MOST_FOR_ZERO_OF_MESH: usize = 1 << 16;
 
-/// Cubes of a round at most: about 1 GB.
+/// Limit of cubes of a round: about 1 GB.
 const MOST: usize = 1 << 22;
 
-/// Triangles near a cube up to which they are cut to it.
+/// Number of triangles near a cube above which they are not cut to it.
 const MOST_CUT: usize = 12;
 
 /// Half the diagonal of a cube of half side 1.
 const HALF_DIAGONAL: f64 = 1.732_050_807_568_877_3;
-
-/// An interval that holds the largest of some distances.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct OneSided {
-    /// A lower bound: the distance at the witness, less the bound on rounding.
-    pub lower: f64,
-    /// An upper bound; 0 if it is proven that there is no such distance.
-    pub upper: f64,
-    /// A point at which the distance is `lower`, up to rounding; absent if `lower` is 0.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub witness: Option<Vec3>,
-}
 
 /// A solid that unions of balls are measured against: the tree and the inside test of one closed,
 /// outward-oriented surface with a diagonal of about 1.
@@ -103,8 +92,8 @@ impl<'a> CoverTest<'a> {
     pub fn uncovered(&self, balls: &[Sphere], tolerance: f64) -> Result<OneSided, MetricError> {
         check(balls, tolerance)?;
         let all = (0..balls.len() as u32).collect();
-        Search::over(self.bounds, all, tolerance)
-            .run(|cube, enough| self.uncovered_in(balls, cube, enough))
+        let bound = |cube: &mut Cube, enough| self.uncovered_in(balls, cube, enough);
+        Cubes::new(tolerance, MOST_FOR_ZERO, bound).search(Largest::above(0.0), self.bounds, all)
     }
 
     /// The largest distance from a point of the union of the balls to the solid, as [`Self::uncovered`].
@@ -129,11 +118,13 @@ impl<'a> CoverTest<'a> {
             let Sphere { centre, radius } = balls[i as usize];
             [centre - radius, centre + radius]
         });
-        let mut search = Search::over(Bounds::of_points(corners), all.clone(), tolerance);
+        let bounds = Bounds::of_points(corners);
+        let mut largest = Largest::above(0.0);
         for (_, height, tip) in reaches {
-            search.raise(height, tip);
+            largest.raise(height - ROUNDING, tip);
         }
-        search.run(|cube, enough| self.overshoot_in(balls, &most, cube, enough))
+        let bound = |cube: &mut Cube, enough| self.overshoot_in(balls, &most, cube, enough);
+        Cubes::new(tolerance, MOST_FOR_ZERO, bound).search(largest, bounds, all)
     }
 
     /// [`Self::uncovered`] and [`Self::overshoot`] of the union of spheres, cones and slabs.
@@ -147,13 +138,13 @@ impl<'a> CoverTest<'a> {
     ) -> Result<[OneSided; 2], MetricError> {
         check_tolerance(tolerance)?;
         let (lo, hi) = union.bounding_box();
-        let [solid, balls] = [self.bounds, Bounds { lo, hi }].map(|bounds| {
-            let search = Search::over(bounds, vec![0], tolerance);
-            Search { most_for_zero: MOST_FOR_ZERO_OF_MESH, ..search }
-        });
+        let most = MOST_FOR_ZERO_OF_MESH;
+        let none = Largest::above(0.0);
+        let uncovered = |cube: &mut Cube, enough| self.uncovered_by(union, cube, enough);
+        let overshoot = |cube: &mut Cube, enough| self.overshoot_of(union, cube, enough);
         Ok([
-            solid.run(|cube, enough| self.uncovered_by(union, cube, enough))?,
-            balls.run(|cube, enough| self.overshoot_of(union, cube, enough))?,
+            Cubes::new(tolerance, most, uncovered).search(none, self.bounds, vec![0])?,
+            Cubes::new(tolerance, most, overshoot).search(none, Bounds { lo, hi }, vec![0])?,
         ])
     }
 
@@ -174,33 +165,34 @@ impl<'a> CoverTest<'a> {
         (self.inside.side(q) != Side::Outside).then_some((Place::Inside, here, q))
     }
 
-    fn uncovered_by(&self, union: &MedialUnion, cube: &Cube, enough: f64) -> Bound {
+    fn uncovered_by(&self, union: &MedialUnion, cube: &mut Cube, enough: f64) -> Bound {
         let (q, reach) = (cube.centre, cube.reach());
         let sigma = union.signed(q);
         let upper = sigma + reach;
         if upper <= enough {
-            return Bound::closed(upper);
+            return Bound::above(upper);
         }
         let value = |p| union.signed(p);
         let Some((place, reached, at)) = self.place_of(cube, sigma, value) else {
-            return Bound::closed(f64::NEG_INFINITY);
+            return Bound::above(f64::NEG_INFINITY);
         };
-        Bound { reached, at, upper, place, balls: Vec::new() }
+        cube.place = place;
+        Bound { reached, at, upper }
     }
 
-    fn overshoot_of(&self, union: &MedialUnion, cube: &Cube, enough: f64) -> Bound {
+    fn overshoot_of(&self, union: &MedialUnion, cube: &mut Cube, enough: f64) -> Bound {
         let (q, reach) = (cube.centre, cube.reach());
         let upper = self.signed(q, &self.tree.closest(q)) + reach;
         if upper <= enough {
-            return Bound::closed(upper);
+            return Bound::above(upper);
         }
         if !union.buries(q, -reach - ROUNDING) {
-            return Bound::closed(f64::NEG_INFINITY);
+            return Bound::above(f64::NEG_INFINITY);
         }
         // A point of the union near the centre of the cube.
         let at = if union.buries(q, 0.0) { Some(q) } else { union.boundary_near(q, 0.0, &mut 0) };
         let (reached, at) = at.map_or((f64::NEG_INFINITY, q), |at| (self.height(at), at));
-        Bound { reached, at, upper, place: cube.place, balls: Vec::new() }
+        Bound { reached, at, upper }
     }
 
     /// The signed distance of a point, negative in the solid, by its closest surface point.
@@ -220,7 +212,7 @@ impl<'a> CoverTest<'a> {
         }
     }
 
-    fn uncovered_in(&self, balls: &[Sphere], cube: &Cube, enough: f64) -> Bound {
+    fn uncovered_in(&self, balls: &[Sphere], cube: &mut Cube, enough: f64) -> Bound {
         let (q, reach) = (cube.centre, cube.reach());
         let over = |i: &u32| balls[*i as usize].signed_distance(q);
         // The nearest ball, and the next.
@@ -240,7 +232,7 @@ impl<'a> CoverTest<'a> {
             upper = upper.min(((q - centre).abs() + cube.half).length() - radius);
         }
         if upper <= enough {
-            return Bound::closed(upper);
+            return Bound::above(upper);
         }
         // The list of balls holds around the closest point, too.
         let value = |p| {
@@ -248,18 +240,19 @@ impl<'a> CoverTest<'a> {
             each.fold(f64::INFINITY, f64::min)
         };
         let Some((place, reached, at)) = self.place_of(cube, signed, value) else {
-            return Bound::closed(f64::NEG_INFINITY);
+            return Bound::above(f64::NEG_INFINITY);
         };
         let two = near.map(|(_, i)| balls[i as usize]);
         if reached <= enough {
             upper = upper.min(self.second_order(two, cube, place, enough));
             if upper <= enough {
-                return Bound { reached, at, ..Bound::closed(upper) };
+                return Bound { reached, at, upper };
             }
         }
         // No ball that is farther than this from `q` is the nearest one within `reach` of it.
-        let list = cube.balls.iter().copied().filter(|i| over(i) <= signed + 2.0 * reach);
-        Bound { reached, at, upper, place, balls: list.collect() }
+        cube.balls.retain(|i| over(i) <= signed + 2.0 * reach);
+        cube.place = place;
+        Bound { reached, at, upper }
     }
 
     /// A bound on the distance to the nearer of two balls in the part of a cube in the solid, by item 5;
@@ -312,7 +305,7 @@ impl<'a> CoverTest<'a> {
         bounds.fold(f64::INFINITY, f64::min)
     }
 
-    fn overshoot_in(&self, balls: &[Sphere], most: &[f64], cube: &Cube, enough: f64) -> Bound {
+    fn overshoot_in(&self, balls: &[Sphere], most: &[f64], cube: &mut Cube, enough: f64) -> Bound {
         let (q, reach) = (cube.centre, cube.reach());
         let meets = |&i: &u32| {
             let Sphere { centre, radius } = balls[i as usize];
@@ -323,7 +316,7 @@ impl<'a> CoverTest<'a> {
         if list.is_empty() {
             // Each ball that was dropped here is no farther away from the solid than `enough`.
             let upper = cube.balls.iter().map(|&i| most[i as usize].min(enough));
-            return Bound::closed(upper.fold(f64::NEG_INFINITY, f64::max));
+            return Bound::above(upper.fold(f64::NEG_INFINITY, f64::max));
         }
         let closest = self.tree.closest(q);
         let signed = self.signed(q, &closest);
@@ -331,7 +324,7 @@ impl<'a> CoverTest<'a> {
         // Dropped balls count as `enough`.
         let upper = of_balls.min(signed + reach).max(enough.min(signed + reach));
         if upper <= enough {
-            return Bound::closed(upper);
+            return Bound::above(upper);
         }
         // A point of the union near the centre of the cube.
         let depth = |i: &&u32| balls[**i as usize].signed_distance(q);
@@ -344,7 +337,8 @@ impl<'a> CoverTest<'a> {
                 (self.height(at), at)
             }
         };
-        Bound { reached, at, upper, place: cube.place, balls: list }
+        cube.balls = list;
+        Bound { reached, at, upper }
     }
 }
 
@@ -377,15 +371,6 @@ fn check(balls: &[Sphere], tolerance: f64) -> Result<(), MetricError> {
     MedialUnion::of_spheres(balls).map(drop).map_err(|error: UnionError| error.into())
 }
 
-/// # Errors
-/// When the tolerance is out of range.
-fn check_tolerance(tolerance: f64) -> Result<(), MetricError> {
-    if !(FINEST..=1.0).contains(&tolerance) {
-        return Err(MetricError::Tolerance(tolerance));
-    }
-    Ok(())
-}
-
 /// A cube, and the balls that can matter in it.
 struct Cube {
     centre: Vec3,
@@ -398,7 +383,7 @@ struct Cube {
 /// What a cube inherits about the surface.
 #[derive(Clone, Copy)]
 enum Place {
-    /// It can meet the surface, of which this face is near.
+    /// It can meet the surface near this face.
     Near(Option<u32>),
     /// It is within the solid.
     Inside,
@@ -411,97 +396,70 @@ impl Cube {
     }
 }
 
-/// Bounds of the largest distance in a cube.
-struct Bound {
-    /// A distance that is reached at `at`.
-    reached: f64,
-    at: Vec3,
-    upper: f64,
-    place: Place,
-    /// The balls that matter in its eighths.
-    balls: Vec<u32>,
-}
-
-impl Bound {
-    /// Of a cube that is not divided.
-    fn closed(upper: f64) -> Self {
-        Self {
-            reached: f64::NEG_INFINITY,
-            at: Vec3::ZERO,
-            upper,
-            place: Place::Near(None),
-            balls: Vec::new(),
-        }
-    }
-}
-
-/// The state of the branch and bound.
-struct Search {
-    cubes: Vec<Cube>,
-    lower: f64,
-    witness: Option<Vec3>,
-    tolerance: f64,
-    /// Cubes of a round up to which a proof of zero goes on.
+/// Cubes with a function that bounds the distances in one.
+struct Cubes<F> {
+    bound: F,
+    /// Width of the interval, without the rounding of its ends.
+    goal: f64,
+    /// Whether the search still looks for a proof of zero.
+    proves: bool,
+    /// Number of cubes of a round above which it gives up.
     most_for_zero: usize,
 }
 
-impl Search {
-    fn over(bounds: Bounds, balls: Vec<u32>, tolerance: f64) -> Self {
+impl<F: Fn(&mut Cube, f64) -> Bound + Sync> Cubes<F> {
+    fn new(tolerance: f64, most_for_zero: usize, bound: F) -> Self {
+        // Both ends are widened by ROUNDING, and half of one more covers the rounding of these sums.
+        Self { bound, goal: tolerance - 2.5 * ROUNDING, proves: true, most_for_zero }
+    }
+
+    /// The interval over the cube around a box, with `balls` that can matter.
+    fn search(
+        mut self,
+        mut largest: Largest,
+        bounds: Bounds,
+        balls: Vec<u32>,
+    ) -> Result<OneSided, MetricError> {
         let mut cubes = Vec::new();
         if !balls.is_empty() {
             let half = 0.5 * (bounds.hi - bounds.lo).max_element();
             let centre = 0.5 * (bounds.lo + bounds.hi);
             cubes.push(Cube { centre, half: half * (1.0 + 1e-9), place: Place::Near(None), balls });
         }
-        Self { cubes, lower: 0.0, witness: None, tolerance, most_for_zero: MOST_FOR_ZERO }
+        largest.search(&mut self, cubes, MOST)?;
+        let Largest { lower, witness, upper, .. } = largest;
+        let upper = if upper <= -ROUNDING { 0.0 } else { upper.max(lower) + ROUNDING };
+        Ok(OneSided { lower, upper, witness })
+    }
+}
+
+impl<F: Fn(&mut Cube, f64) -> Bound + Sync> Pieces for Cubes<F> {
+    type Piece = Cube;
+    type Near = ();
+    const RUN: usize = 16;
+
+    fn begin(&mut self, cubes: &[Cube], lower: f64) {
+        // Once given up, a proof of zero is not resumed: the upper bound is positive by then.
+        self.proves &=
+            lower == 0.0 && cubes.len() <= self.most_for_zero && cubes[0].reach() > SMALLEST;
     }
 
-    /// Takes a distance that is reached at a point.
-    fn raise(&mut self, reached: f64, at: Vec3) {
-        if reached - ROUNDING > self.lower {
-            (self.lower, self.witness) = (reached - ROUNDING, Some(at));
-        }
+    fn enough(&self, lower: f64) -> f64 {
+        if self.proves && lower == 0.0 { -ROUNDING } else { lower + self.goal }
     }
 
-    fn run(mut self, bound: impl Fn(&Cube, f64) -> Bound + Sync) -> Result<OneSided, MetricError> {
-        // Both ends are widened by ROUNDING, and half of one more covers the rounding of these sums.
-        let goal = self.tolerance - 2.5 * ROUNDING;
-        let mut upper = f64::NEG_INFINITY;
-        let mut cubes = std::mem::take(&mut self.cubes);
-        // Once given up, a proof of zero is not resumed: `upper` is positive by then.
-        let mut proves = true;
-        while let Some(first) = cubes.first() {
-            proves &=
-                self.lower == 0.0 && cubes.len() <= self.most_for_zero && first.reach() > SMALLEST;
-            let now = if proves { -ROUNDING } else { self.lower + goal };
-            let bounds: Vec<Bound> =
-                cubes.par_iter().with_min_len(16).map(|cube| bound(cube, now)).collect();
-            // In the order of the cubes, and only now: `lower` must not depend on threads.
-            for bound in &bounds {
-                self.raise(bound.reached, bound.at);
-            }
-            let now = if self.lower > 0.0 { self.lower + goal } else { now };
-            let mut eighths = Vec::new();
-            for (cube, bound) in cubes.iter().zip(bounds) {
-                if bound.upper <= now {
-                    upper = upper.max(bound.upper);
-                    continue;
-                }
-                let half = 0.5 * cube.half;
-                for octant in 0..8_u32 {
-                    let sign = |bit: u32| if octant >> bit & 1 == 1 { half } else { -half };
-                    let centre = cube.centre + Vec3::new(sign(0), sign(1), sign(2));
-                    let (place, balls) = (bound.place, bound.balls.clone());
-                    eighths.push(Cube { centre, half, place, balls });
-                }
-                if eighths.len() > MOST {
-                    return Err(MetricError::TooFine { tolerance: self.tolerance, pieces: MOST });
-                }
-            }
-            cubes = eighths;
+    fn bound(&self, cube: &mut Cube, _: f64, enough: f64, (): &mut ()) -> Bound {
+        let bound = (self.bound)(cube, enough);
+        Bound { reached: bound.reached - ROUNDING, ..bound }
+    }
+
+    fn divide(&self, cube: &Cube, parts: &mut Vec<Cube>) {
+        let half = 0.5 * cube.half;
+        for octant in 0..8_u32 {
+            let sign = |bit: u32| if octant >> bit & 1 == 1 { half } else { -half };
+            let centre = cube.centre + Vec3::new(sign(0), sign(1), sign(2));
+            parts.push(Cube { centre, half, place: cube.place, balls: cube.balls.clone() });
         }
-        let upper = if upper <= -ROUNDING { 0.0 } else { upper.max(self.lower) + ROUNDING };
-        Ok(OneSided { lower: self.lower, upper, witness: self.witness })
     }
 }
 
@@ -598,6 +556,39 @@ mod tests {
         holds(uncovered, Vec3::new(1.0, 0.25, 0.25).length() - 0.25);
     }
 
+    /// Compares intervals with the largest of sampled distances, which fall short by less than `slack`, and checks the
+    /// witnesses.
+    fn hold_for_samples(
+        test: &CoverTest<'_>,
+        intervals: [OneSided; 2],
+        slack: f64,
+        sigma: impl Fn(Vec3) -> f64,
+        mut point: impl FnMut() -> Vec3,
+    ) {
+        let mut largest = [0.0_f64; 2];
+        for _ in 0..20_000 {
+            let p = point();
+            let (height, sigma) = (test.height(p), sigma(p));
+            if height == 0.0 {
+                largest[0] = largest[0].max(sigma);
+            }
+            if sigma <= 0.0 {
+                largest[1] = largest[1].max(height);
+            }
+        }
+        for (sampled, interval) in largest.into_iter().zip(intervals) {
+            let OneSided { upper, lower, .. } = interval;
+            assert!(sampled <= upper && sampled > lower - slack, "{sampled} {interval:?}");
+            assert!(upper - lower <= TOLERANCE, "{interval:?}");
+        }
+        let [uncovered, overshoot] = intervals;
+        let at = uncovered.witness.unwrap();
+        assert!(test.height(at) < 1e-9 && (sigma(at) - uncovered.lower).abs() < 1e-8);
+        if let Some(at) = overshoot.witness {
+            assert!(sigma(at) < 1e-9 && (test.height(at) - overshoot.lower).abs() < 1e-8);
+        }
+    }
+
     #[test]
     fn samples_never_contradict_the_intervals() {
         let mut mesh = TriMesh::default();
@@ -611,27 +602,10 @@ mod tests {
         for round in 0..6 {
             let ball = |_| Sphere::new(point(0.5), 0.02 + 0.1 * point(1.0).x.abs());
             let balls: Vec<_> = (0..10 + 8 * round).map(ball).collect();
-            let [uncovered, overshoot] = errors(&mesh, &balls, TOLERANCE);
             let sigma =
                 |p: Vec3| balls.iter().map(|b| b.signed_distance(p)).fold(f64::INFINITY, f64::min);
-            let mut largest = [0.0_f64; 2];
-            for _ in 0..20_000 {
-                let p = point(0.7);
-                if test.height(p) == 0.0 {
-                    largest[0] = largest[0].max(sigma(p));
-                }
-                if sigma(p) <= 0.0 {
-                    largest[1] = largest[1].max(test.height(p));
-                }
-            }
-            for (sampled, interval) in largest.into_iter().zip([uncovered, overshoot]) {
-                let OneSided { upper, lower, .. } = interval;
-                assert!(sampled <= upper && sampled > lower - 0.06, "{sampled} {interval:?}");
-            }
-            let at = uncovered.witness.unwrap();
-            assert!(test.height(at) < 1e-9 && (sigma(at) - uncovered.lower).abs() < 1e-8);
-            let at = overshoot.witness.unwrap();
-            assert!(sigma(at) < 1e-9 && (test.height(at) - overshoot.lower).abs() < 1e-8);
+            let intervals = errors(&mesh, &balls, TOLERANCE);
+            hold_for_samples(&test, intervals, 0.06, sigma, || point(0.7));
         }
     }
 
@@ -653,31 +627,9 @@ mod tests {
             let medial = MedialMesh::from_simplices(spheres, edges, faces).unwrap();
             let union = MedialUnion::new(&medial).unwrap();
             let intervals = test.of_union(&union, TOLERANCE).unwrap();
-            let mut largest = [0.0_f64; 2];
-            for _ in 0..20_000 {
-                let p = point(Vec3::new(0.5, 0.3, 0.15));
-                let (height, sigma) = (test.height(p), union.signed(p));
-                if height == 0.0 {
-                    largest[0] = largest[0].max(sigma);
-                }
-                if sigma <= 0.0 {
-                    largest[1] = largest[1].max(height);
-                }
-            }
-            for (k, (sampled, interval)) in largest.into_iter().zip(intervals).enumerate() {
-                let OneSided { upper, lower, .. } = interval;
-                assert!(sampled <= upper && sampled > lower - 0.03, "{sampled} {interval:?}");
-                assert!(upper - lower <= TOLERANCE, "{interval:?}");
-                positive[k] += usize::from(lower > 0.0);
-            }
-            let [uncovered, overshoot] = intervals;
-            let at = uncovered.witness.unwrap();
-            assert!(test.height(at) < 1e-9 && (union.signed(at) - uncovered.lower).abs() < 1e-8);
-            if let Some(at) = overshoot.witness {
-                assert!(
-                    union.signed(at) < 1e-9 && (test.height(at) - overshoot.lower).abs() < 1e-8
-                );
-            }
+            let around = || point(Vec3::new(0.5, 0.3, 0.15));
+            hold_for_samples(&test, intervals, 0.03, |p| union.signed(p), around);
+            intervals.iter().zip(&mut positive).for_each(|(i, n)| *n += u32::from(i.lower > 0.0));
         }
         assert!(positive.iter().all(|&count| count > 4), "{positive:?}");
     }

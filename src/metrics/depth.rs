@@ -20,9 +20,9 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use super::ROUNDING;
 use super::ascent::Peak;
-use super::pieces::{EXPOSED, Enclosure, Patches, Piece, burying, farthest};
+use super::bounds::ROUNDING;
+use super::pieces::{EXPOSED, Enclosure, Patches, Piece, burying};
 use crate::Vec3;
 use crate::complex::{MedialUnion, NearestPrimitive};
 use crate::geometry::trees::{PointTree, in_morton_order};
@@ -36,8 +36,8 @@ const MAX_PIECES: usize = 1 << 14;
 /// Limit of points searched for the largest depth. Then it is a lower bound only.
 const MAX_SEARCHES: usize = 256;
 
-/// Bounds of a depth that are farther apart than this share of the extent of a piece of the surface are improved by
-/// a search, to half of that.
+/// Width of the interval around a depth, as a share of the extent of a piece of the surface, above which a search halves
+/// it.
 pub(super) const DOUBT: f64 = 0.25;
 
 /// Width of the interval around a depth searched for the largest, as a share of it.
@@ -197,13 +197,9 @@ impl<'a> Boundary<'a> {
             parts.clear();
             let enclosure = self.patches.enclose(&open.piece);
             let (centre, corners) = (enclosure.centre, enclosure.corners());
-            let reach = farthest(centre, corners);
+            let reach = enclosure.reach();
             let deepest = self.union.deepest_or(centre, &mut near, burying(reach));
-            let hulls = &self.patches.hulls;
-            if deepest.signed < -EXPOSED
-                && (deepest.signed + reach < -EXPOSED
-                    || hulls.largest_over(deepest.primitive, corners) < -EXPOSED)
-            {
+            if self.patches.hulls.bury(deepest, reach, corners) {
                 continue;
             }
             if deepest.signed >= -EXPOSED && p.distance(centre) < depth.upper {
@@ -238,7 +234,7 @@ impl<'a> Boundary<'a> {
         self.initial.get_or_init(|| {
             let enclosed = self.patches.pieces().into_iter().map(|piece| {
                 let enclosure = self.patches.enclose(&piece);
-                (piece, enclosure.centre, farthest(enclosure.centre, enclosure.corners()))
+                (piece, enclosure.centre, enclosure.reach())
             });
             enclosed.collect()
         })

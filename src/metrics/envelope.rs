@@ -37,10 +37,11 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-use super::MetricError;
+use super::error::MetricError;
+use super::pieces::{across, neighbours};
 use super::samples::Pose;
 use crate::Vec3;
-use crate::complex::{Incidence, MedialMesh, MedialUnion};
+use crate::complex::{MedialMesh, MedialUnion};
 use crate::geometry::hash::splitmix;
 use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
 
@@ -56,31 +57,33 @@ pub struct EnvelopeOptions {
     pub seed: u64,
 }
 
-/// The pilot run has one candidate for this many requested samples.
+/// Requested samples for each candidate of the pilot run.
 const PILOT: f64 = 8.0;
-/// The pilot run has at least this many candidates.
+/// Least number of candidates of the pilot run.
 const MIN_PILOT: f64 = 1000.0;
 
-/// The main run makes at most this many candidates per requested sample. If more were needed, nearly
-/// all of the area is buried, and fewer samples than requested are returned.
+/// Limit of candidates of the main run for each requested sample. If more were needed, nearly all of the area is buried,
+/// and fewer samples than requested are returned.
 const USUAL_CANDIDATES: f64 = 10.0;
 
-/// More candidates are made only until this share of the requested samples survives, enough for a
-/// maximum: many balls bury nearly all of each other.
+/// Share of the requested samples, enough for a maximum, up to which more candidates are made: many balls bury nearly all
+/// of each other.
 const MIN_SHARE: f64 = 0.25;
-/// But never more candidates per requested sample than this.
+/// Limit of these candidates for each requested sample.
 const MAX_CANDIDATES: f64 = 200.0;
 
-/// A cell of a patch has about this many candidates.
+/// Approximate number of candidates in a cell of a patch.
 const CELL: usize = 8;
-/// Patches, near to each other, whose points are searched one after the other.
+/// Number of patches, near to each other, whose points are searched one after the other.
 const RUN: usize = 16;
-/// Share of the union's diagonal, more than distances are rounded by, so that each point of a buried
-/// cell would be found to be buried.
+/// Margin of the test for buried cells, as a share of the union's diagonal: more than the rounding of distances, so that a
+/// search finds each of their points buried.
 const MARGIN: f64 = 1e-10;
 
-/// The golden ratio's fractional part, and the two of the plastic number: steps of the sequences.
+/// Step of the one-dimensional sequence: the golden ratio's fractional part.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// Steps of the two-dimensional sequence, of the plastic number.
 const PLASTIC: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 
 /// Points on the boundary of the union of the primitives of `mesh`, uniform by area.
@@ -186,17 +189,7 @@ fn patches(mesh: &MedialMesh, pose: &Pose) -> Vec<Patch> {
     let of = |corners: &[u32]| {
         std::array::from_fn(|k| corners.get(k).map_or([0; 2], |&v| cells[v as usize]))
     };
-    let mut at_spheres = vec![vec![]; mesh.spheres.len()];
-    for &[a, b] in &mesh.edges {
-        at_spheres[a as usize].push(mesh.spheres[b as usize]);
-        at_spheres[b as usize].push(mesh.spheres[a as usize]);
-    }
-    let mut at_edges = vec![vec![]; mesh.edges.len()];
-    for (&[a, b, c], edges) in mesh.faces.iter().zip(Incidence::of(mesh).face_edges()) {
-        for (edge, third) in edges.iter().zip([c, b, a]) {
-            at_edges[*edge as usize].push(mesh.spheres[third as usize]);
-        }
-    }
+    let [at_spheres, at_edges] = neighbours(mesh);
     let mut patches: Vec<Patch> = (0..)
         .zip(&mesh.spheres)
         .zip(at_spheres)
@@ -415,8 +408,7 @@ impl Surface {
     }
 }
 
-/// Cells of a patch, of which some lie as a whole inside another primitive: their points need not be
-/// made.
+/// Cells of a patch. Points of a cell that another primitive contains need not be made.
 struct Grid {
     sides: [usize; 2],
     /// Length of a cell along each coordinate.
@@ -467,16 +459,6 @@ impl Grid {
             [0, 1].map(|k| ((place[k] * self.sides[k] as f64) as usize).min(self.sides[k] - 1));
         self.buried[row * self.sides[1] + column]
     }
-}
-
-/// The unit vector orthogonal to a cone's axis in the direction of the first of `axes` that is not
-/// nearly parallel to the cone's axis.
-pub(super) fn across(frame: &ConeFrame, axes: [Vec3; 3]) -> Vec3 {
-    let [x, y, _] = axes;
-    // Below one half, so that one of two orthogonal axes always qualifies; not a simple fraction, so
-    // that rounding does not decide for symmetric shapes.
-    let is_across = x.reject_from_normalized(frame.u).length_squared() > 0.2137;
-    frame.across(if is_across { x } else { y }).unwrap_or(frame.v)
 }
 
 /// Uniform over all rotations (Shoemake 1992, "Uniform random rotations", Graphics Gems III).

@@ -26,17 +26,17 @@
 //!   with a weight that falls to 0 at this depth. So strips along the curves where neighbouring
 //!   primitives touch count more than once in `reverse_mean`.
 
-use super::Distances;
-use super::ascent::{OnMesh, OnUnion, Peak, Start, ascend};
+use super::ascent::{OnMesh, OnUnion, Peak, SEEDS, Start, ascend};
 use super::depth::Boundary;
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
-use super::pieces::Patches;
-use super::samples::{SEEDS, SurfaceSamples};
+use super::error::MetricError;
+use super::evaluation::Distances;
+use super::pieces::{EXPOSED, Patches};
+use super::samples::SurfaceSamples;
 use super::sweep::{FINAL_SHARE, swept};
 use crate::Vec3;
-use crate::complex::{MedialMesh, MedialUnion, UnionError};
-use crate::geometry::TriangulationError;
-use crate::surface::{BvhError, TriMesh, TriangleBvh};
+use crate::complex::{MedialMesh, MedialUnion};
+use crate::surface::{TriMesh, TriangleBvh};
 
 /// How densely to sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,53 +53,6 @@ impl Default for DistanceOptions {
     fn default() -> Self {
         Self { surface_samples: 50_000, envelope_samples: 50_000, seed: 0 }
     }
-}
-
-/// Why distances could not be measured.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum MetricError {
-    /// The medial mesh has no union.
-    #[error(transparent)]
-    Union(#[from] UnionError),
-    /// The axis or surface to measure against has no tree.
-    #[error(transparent)]
-    Tree(BvhError),
-    /// The surface has no area that could be sampled.
-    #[error("the surface has no finite area to sample")]
-    NoArea,
-    /// The surface has no volume that could be compared with.
-    #[error("the surface encloses no volume (signed volume {0}); it must be closed and oriented")]
-    NoVolume(f64),
-    /// No samples were requested.
-    #[error("{0}: too few samples (found 0, expected at least 1)")]
-    NoSamples(&'static str),
-    /// Balls on the primitives need a distance between them.
-    #[error("spacing {0}: not positive")]
-    Spacing(f64),
-    /// The balls on the primitives would not fit into memory.
-    #[error("{count:.0} balls: too many (expected at most {most}); choose a wider spacing")]
-    TooManyBalls {
-        /// Balls at the requested spacing.
-        count: f64,
-        /// The limit.
-        most: usize,
-    },
-    /// An interval that cannot be certified.
-    #[error(
-        "tolerance {0}: cannot be certified (expected a fraction of the diagonal between 1e-6 and 1)"
-    )]
-    Tolerance(f64),
-    /// The certificate would not fit into memory.
-    #[error("tolerance {tolerance:.1e}: needs {pieces} pieces and more; choose a larger one")]
-    TooFine {
-        /// Width of the interval.
-        tolerance: f64,
-        /// Pieces at the moment of giving up.
-        pieces: usize,
-    },
-    /// The balls on the primitives cannot be triangulated.
-    #[error(transparent)]
-    Triangulation(#[from] TriangulationError),
 }
 
 /// Distances between the surface `surface`, whose faces are in `bvh`, and the union of the
@@ -152,7 +105,7 @@ pub(super) fn distances_with_envelope(
     let depths = boundary.values(&samples.points, &depths, &sampled.points);
     let balls = MedialUnion::of_spheres(&mesh.spheres)?;
     let spheres = absolute(balls.signed_batch(&samples.points));
-    let start = samples.start(&depths);
+    let start = Start::new(samples, &depths);
     let depth_at = |p, near: &mut usize| boundary.estimate(p, near);
     let mut forward = ascend(&OnMesh { mesh: bvh, value: depth_at }, &start);
     let by_mu = Start { values: &mu, ..start };
@@ -218,10 +171,6 @@ pub(super) fn highest(
     let peaks: Vec<f64> = peaks.iter().map(|peak| peak.distance).collect();
     largest(&[largest(start.values), largest(&peaks)])
 }
-
-/// Depth, as a fraction of the surface's diameter, from which a point reached by the ascent is not on
-/// the union's boundary.
-pub(super) const EXPOSED: f64 = 1e-12;
 
 /// Depth, as a fraction of the surface's diameter, from which a sample of one primitive's surface
 /// counts as buried in another primitive, and not as on the union's boundary.

@@ -8,13 +8,18 @@ pub const DEFINITIONS: u32 = 2;
 
 mod ascent;
 mod axis_distance;
+mod bounds;
 mod certificate;
 mod cover;
 mod depth;
 mod envelope;
+mod error;
+mod evaluation;
 mod hausdorff;
 mod judge;
+mod peaks;
 mod pieces;
+mod quality;
 mod samples;
 mod spikes;
 mod structure;
@@ -22,21 +27,24 @@ mod sweep;
 mod union_topology;
 mod volume;
 
-pub use ascent::{Peak, PeakSearch, Peaks};
+pub use ascent::Peak;
 pub use axis_distance::{AxisOptions, COVERED, axis_distance};
-pub use certificate::{Certificate, FINEST, ROUNDING, Witness, WitnessSide, certify};
-pub use cover::{CoverTest, OneSided, SMALLEST};
+pub use bounds::{FINEST, ROUNDING};
+pub use certificate::certify;
+pub use cover::{CoverTest, SMALLEST};
 pub use envelope::{EnvelopeOptions, sample_envelope};
-pub use hausdorff::{DistanceOptions, MetricError, distances};
-pub use judge::{
-    AxisDistances, AxisSpan, Counts, Cover, Distances, Evaluation, Judge, JudgeOptions, MeanAndP95,
-    RatioSpikes, SheetCoverage, Spikes, TriangleQuality, Truth, counts, triangle_quality,
+pub use error::MetricError;
+pub use evaluation::{
+    AxisDistances, AxisSpan, Centrality, Certificate, Completeness, ContactTable, ContactType,
+    Counts, Cover, Distances, Evaluation, Features, GraphSizes, MeanAndP95, OneSided, Outside,
+    RatioSpikes, SheetCoverage, SheetDifference, SheetPair, Spikes, Structure, TriangleQuality,
+    Witness, WitnessSide,
 };
+pub use hausdorff::{DistanceOptions, distances};
+pub use judge::{Judge, JudgeOptions, Truth};
+pub use peaks::{PeakSearch, Peaks};
+pub use quality::{counts, triangle_quality};
 pub use spikes::{FIN_ANGLE, IDLE_PROTRUSION, RATIO_THRESHOLDS, SPIKE_ANGLE, spikes};
-pub use structure::{
-    CONTACT, Centrality, Completeness, ContactTable, ContactType, Features, GraphSizes, Outside,
-    REACHED, SHARP_ANGLE, SheetDifference, SheetPair, Structure, StructureSurface,
-    sheet_difference,
-};
+pub use structure::{CONTACT, REACHED, SHARP_ANGLE, StructureSurface};
 pub use union_topology::{topology_warning, union_betti};
 pub use volume::{VolumeOptions, enclosed_volume, volume_error};

@@ -5,12 +5,13 @@
 
 use std::f64::consts::TAU;
 
-use super::envelope::across;
 use crate::Vec3;
-use crate::complex::{MedialMesh, Primitive};
+use crate::complex::{Incidence, MedialMesh, NearestPrimitive, Primitive};
+use crate::geometry::planar_frame::PlanarFrame;
 use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
+use crate::surface::TriMesh;
 
-/// The primitives as whole convex bodies, unlike the parts in [`MedialUnion`].
+/// The primitives as whole convex bodies, unlike the parts of a [`MedialUnion`](crate::complex::MedialUnion).
 pub(super) struct Hulls {
     spheres: Vec<Sphere>,
     cones: Vec<Cone>,
@@ -47,11 +48,45 @@ impl Hulls {
         // A convex function is largest over a convex hull at one of its corners.
         corners.iter().fold(f64::NEG_INFINITY, |largest, &p| largest.max(self.signed(primitive, p)))
     }
+
+    /// Whether a primitive contains a convex polytope, by the signed distance at a point that is within `reach` of it.
+    pub fn bury(&self, at: NearestPrimitive, reach: f64, corners: &[Vec3]) -> bool {
+        // The Lipschitz bound first: it costs nothing.
+        at.signed < -EXPOSED
+            && (at.signed + reach < -EXPOSED || self.largest_over(at.primitive, corners) < -EXPOSED)
+    }
 }
 
 /// The distance from a point to the farthest of some others.
 pub(super) fn farthest(from: Vec3, points: &[Vec3]) -> f64 {
     points.iter().fold(0.0, |far, &p| f64::max(far, from.distance_squared(p))).sqrt()
+}
+
+/// The largest distance to a triangle over the convex hull of some points.
+pub(super) fn largest_distance(triangle: &PlanarFrame, corners: &[Vec3]) -> f64 {
+    // The distance is convex.
+    corners.iter().map(|&corner| triangle.distance_squared(corner)).fold(0.0, f64::max).sqrt()
+}
+
+/// The triangles of a surface.
+pub(super) fn planar_frames(surface: &TriMesh) -> Vec<PlanarFrame> {
+    (0..surface.faces.len()).map(|face| PlanarFrame::new(surface.triangle(face)).0).collect()
+}
+
+/// For each sphere the other ends of its edges, and for each edge the third corners of its faces.
+pub(super) fn neighbours(mesh: &MedialMesh) -> [Vec<Vec<Sphere>>; 2] {
+    let mut at_spheres = vec![vec![]; mesh.spheres.len()];
+    for &[a, b] in &mesh.edges {
+        at_spheres[a as usize].push(mesh.spheres[b as usize]);
+        at_spheres[b as usize].push(mesh.spheres[a as usize]);
+    }
+    let mut at_edges = vec![vec![]; mesh.edges.len()];
+    for (&[a, b, c], edges) in mesh.faces.iter().zip(Incidence::of(mesh).face_edges()) {
+        for (edge, third) in edges.iter().zip([c, b, a]) {
+            at_edges[*edge as usize].push(mesh.spheres[third as usize]);
+        }
+    }
+    [at_spheres, at_edges]
 }
 
 /// A triangle in four, by the midpoints of its sides.
@@ -63,17 +98,17 @@ pub(super) fn quartered(
     [[a, f, e], [f, b, d], [e, d, c], [d, e, f]]
 }
 
-/// A point of a primitive's surface is on the boundary of the union, up to rounding, if it is no
-/// deeper than this in any primitive.
+/// Depth in a primitive, as a fraction of the surface's diameter, from which a point is not on the boundary of the union:
+/// above rounding.
 pub(super) const EXPOSED: f64 = 1e-12;
 
-/// The signed distance at the centre of a piece of some reach from which on a primitive buries all of it: any such
-/// primitive ends a search.
+/// The signed distance at the centre of a piece below which a primitive buries all of a piece of this reach, and ends a
+/// search.
 pub(super) fn burying(reach: f64) -> f64 {
     -(EXPOSED + reach) * (1.0 + 1e-9)
 }
 
-/// Initial parts of a cone's lateral around its axis.
+/// Number of initial parts of a cone's lateral around its axis.
 pub(super) const SECTORS: u32 = 6;
 
 /// The surfaces of all primitives of a medial mesh.
@@ -232,6 +267,16 @@ impl<'a> Patches<'a> {
     }
 }
 
+/// The unit vector orthogonal to a cone's axis in the direction of the first of `axes` that is not
+/// nearly parallel to the cone's axis.
+pub(super) fn across(frame: &ConeFrame, axes: [Vec3; 3]) -> Vec3 {
+    let [x, y, _] = axes;
+    // Below one half, so that one of two orthogonal axes always qualifies; not a simple fraction, so
+    // that rounding does not decide for symmetric shapes.
+    let is_across = x.reject_from_normalized(frame.u).length_squared() > 0.2137;
+    frame.across(if is_across { x } else { y }).unwrap_or(frame.v)
+}
+
 /// The normal of a cone's lateral at an angle, with its component across the axis multiplied by
 /// `lift`.
 pub(super) fn lateral_normal(frame: &ConeFrame, angle: f64, lift: f64) -> Vec3 {
@@ -247,6 +292,11 @@ impl Enclosure {
             enclosure.count += 1;
         }
         enclosure
+    }
+
+    /// The distance from the centre within which the piece is.
+    pub fn reach(&self) -> f64 {
+        farthest(self.centre, self.corners())
     }
 
     pub fn corners(&self) -> &[Vec3] {

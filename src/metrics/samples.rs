@@ -12,8 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-use super::MetricError;
-use super::ascent::Start;
+use super::error::MetricError;
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, UnionError};
 use crate::geometry::trees::morton_code;
@@ -28,11 +27,8 @@ pub(super) struct SurfaceSamples {
     /// How many of them are area-uniform.
     pub uniform: usize,
     /// Typical distance between these.
-    spacing: f64,
+    pub spacing: f64,
 }
-
-/// Number of samples from which an ascent starts.
-pub(super) const SEEDS: usize = 72;
 
 impl SurfaceSamples {
     /// `count` area-uniform samples of a surface, and its vertices. `O(n log n)`.
@@ -59,12 +55,6 @@ impl SurfaceSamples {
         // A refusal names a sphere by its number in the mesh as it was given.
         let union = MedialUnion::new(&ordered).or_else(|_| MedialUnion::new(mesh))?;
         Ok((ordered, union))
-    }
-
-    /// An ascent from the largest of the values at the samples.
-    pub fn start<'a>(&'a self, values: &'a [f64]) -> Start<'a> {
-        let Self { pose, points, spacing, .. } = self;
-        Start { pose, points, values, spacing: *spacing, seeds: SEEDS }
     }
 }
 
@@ -175,10 +165,10 @@ fn uniform_in(triangle: usize, rng: &mut Pcg64) -> Placed {
 // All lists are ordered along a Morton curve in this frame. Its cells are offset from all round
 // numbers, so that the rounding of a rotation hardly ever moves a point into another cell.
 
-/// Candidates whose distances agree to this, as a fraction, are equally far.
+/// Relative difference up to which candidates are equally far.
 const EQUAL: f64 = 1e-9;
 
-/// Frames whose sums over all triangles agree to this are symmetric to each other.
+/// Difference of sums over all triangles up to which frames are symmetric to each other.
 const SYMMETRIC: f64 = 1e-10;
 
 /// Bound on the number of candidates times the number of triangles. A polyhedral group has 120

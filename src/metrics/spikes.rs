@@ -23,9 +23,9 @@
 //! as `1 - cos a`: 0.29 on a box, 0.13 at a convex edge of 120 degrees, 0 at the rim of a smooth
 //! shape. Compare with the value on the exact axis, not with zero.
 
+use super::evaluation::{RatioSpikes, Spikes};
 use super::hausdorff::Envelope;
-use super::judge::{corners, degrees, extreme_angles};
-use super::{RatioSpikes, Spikes};
+use super::quality::{corners, degrees, extreme_angles};
 use crate::complex::{Contacts, Incidence, MedialMesh, Sphere, ZERO_LENGTH, stability_ratio};
 use crate::geometry::{DisjointSets, separation_angle};
 use crate::surface::{InsideTest, Side};

@@ -15,15 +15,17 @@
 //!
 //! METHODOLOGY.md defines the numbers. All lengths are fractions of the surface's diagonal.
 
-use std::fmt;
 use std::sync::Arc;
 
 use glam::DVec4;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-use super::MetricError;
 use super::axis_distance::{PreparedAxis, lifted, sample_segments};
+use super::error::MetricError;
+use super::evaluation::{
+    Centrality, Completeness, ContactTable, ContactType, Features, GraphSizes, Outside,
+    SheetDifference, SheetPair, Structure, share,
+};
 use super::hausdorff::Summary;
 use super::samples::place_on_triangles;
 use crate::Vec3;
@@ -35,210 +37,48 @@ use crate::surface::{
     smooth_normals,
 };
 
-/// Excess over the least distance up to which the surface touches a ball. So two planes count as one contact if they turn
-/// by less than 28 degrees.
+/// Excess over the least distance, as a share of it, up to which the surface touches a ball. So two planes count as one
+/// contact if they turn by less than 28 degrees.
 pub const CONTACT: f64 = 0.03;
 
-/// Distance within which a feature is reached and a medial ball is found.
+/// Distance within which a feature is reached and a medial ball is found, as a fraction of the diagonal.
 pub const REACHED: f64 = 0.01;
 
 /// Angle, in degrees, by which the surface turns at a sharp edge.
 pub const SHARP_ANGLE: f64 = 30.0;
 
-/// Depth below which a point counts as one of the surface.
+/// Depth below which a point counts as one of the surface, as a fraction of the diagonal.
 const ON_SURFACE: f64 = 1e-3;
 
-/// Depth outside below which a point is outside by rounding.
+/// Distance from the solid below which a point is outside by rounding, as a fraction of the diagonal.
 const ROUNDING: f64 = 1e-6;
 
-/// Samples of sheets, and of seams, boundaries and curves each; junctions at most; surface points.
+/// Number of samples of sheets.
 const SHEET_SAMPLES: usize = 600;
+
+/// Number of samples of seams, of boundaries and of curves. Limit of junctions.
 const CURVE_SAMPLES: usize = 200;
+
+/// Number of surface points whose medial balls are sought.
 const SURFACE_SAMPLES: usize = 1_000;
 
-/// Samples along sharp edges: their spacing, and about how many at most.
+/// Spacing of the samples along sharp edges, as a fraction of the diagonal.
 const FEATURE_SPACING: f64 = 0.005;
+
+/// Limit of samples along sharp edges.
 const FEATURE_SAMPLES: f64 = 4_000.0;
 
-/// Samples that look for parts outside: their spacing, how many a side has at most, and about how many in all.
+/// Spacing of the samples that look for parts outside, as a fraction of the diagonal.
 const OUTSIDE_SPACING: f64 = 0.02;
+
+/// Limit of these samples along a side.
 const OUTSIDE_SIDE: f64 = 16.0;
+
+/// Approximate limit of all of these samples.
 const OUTSIDE_SAMPLES: f64 = 2e5;
 
-/// Areas of sheets that are listed.
+/// Limit of sheets whose areas are listed.
 const LISTED: usize = 32;
-
-/// The structure of a medial mesh: JSON key `structure`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Structure {
-    /// Sizes of the sheet graph.
-    pub graph: GraphSizes,
-    /// Contacts at samples.
-    pub contacts: ContactTable,
-    /// How central samples are.
-    pub centrality: Centrality,
-    /// Sharp edges and corners that are reached.
-    pub features: Features,
-    /// Medial balls that are found.
-    pub completeness: Completeness,
-    /// Parts outside of the solid.
-    pub outside: Outside,
-    /// Sheets against those of the known axis, or of a reference.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub known: Option<SheetDifference>,
-}
-
-/// Sizes of a sheet graph.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct GraphSizes {
-    /// Number of sheets.
-    pub sheets: u64,
-    /// Their total area.
-    pub sheet_area: f64,
-    /// Areas of the largest sheets, at most 32.
-    pub areas: Vec<f64>,
-    /// Number of pieces that are too narrow to be sheets.
-    pub small_pieces: u64,
-    /// Their area.
-    pub small_area: f64,
-    /// Closed pockets: the second Betti number beyond the cavities of the solid.
-    pub pockets: u64,
-    /// Number of seams.
-    pub seams: u64,
-    /// Their total length.
-    pub seam_length: f64,
-    /// Share of that length where exactly three sheets meet.
-    pub seams_of_three: Option<f64>,
-    /// Number of curves.
-    pub curves: u64,
-    /// Their total length.
-    pub curve_length: f64,
-    /// Number of junctions.
-    pub junctions: u64,
-    /// Length at which sheets end.
-    pub boundary_length: f64,
-}
-
-impl fmt::Display for GraphSizes {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { sheets, seams, junctions, curves, pockets, small_pieces, .. } = self;
-        write!(f, "sheets {sheets}, seams {seams}, junctions {junctions}, curves {curves}")?;
-        let area =
-            100.0 * self.small_area / (self.small_area + self.sheet_area).max(f64::MIN_POSITIVE);
-        write!(f, "; small pieces {small_pieces} ({area:.1} % of the area), pockets {pockets}")
-    }
-}
-
-/// The contacts at a point inside a solid.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ContactType {
-    /// One, or the point is on the surface.
-    Boundary,
-    /// Two.
-    Sheet,
-    /// Three.
-    Seam,
-    /// Four or more.
-    Junction,
-    /// One or more, of which one surrounds the point.
-    Curve,
-    /// The point is outside of the solid.
-    Outside,
-}
-
-/// How many samples of each part of a medial mesh have which contacts, in the order of [`ContactType`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct ContactTable {
-    /// Where sheets end.
-    pub boundary: [u32; 6],
-    /// On sheets.
-    pub sheet: [u32; 6],
-    /// On seams.
-    pub seam: [u32; 6],
-    /// At junctions.
-    pub junction: [u32; 6],
-    /// On curves.
-    pub curve: [u32; 6],
-}
-
-impl ContactTable {
-    /// Share of the samples with the contacts of their part.
-    pub fn right(&self) -> Option<f64> {
-        let rows = [self.boundary, self.sheet, self.seam, self.junction, self.curve];
-        let right: u32 = (0..5).map(|k| rows[k][k]).sum();
-        // Curves meet sheets in points that are surrounded.
-        let right = right + self.junction[ContactType::Curve as usize];
-        share(right, rows.as_flattened().iter().sum())
-    }
-
-    /// The same of seams alone.
-    pub fn seams_right(&self) -> Option<f64> {
-        share(self.seam[ContactType::Seam as usize], self.seam.iter().sum())
-    }
-}
-
-fn share(part: u32, all: u32) -> Option<f64> {
-    (all > 0).then(|| f64::from(part) / f64::from(all))
-}
-
-/// How central samples of sheets and curves are; absent where there are none inside.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Centrality {
-    /// Mean difference of the distances to the two contacts.
-    pub mean: Option<f64>,
-    /// 95th percentile of the same.
-    pub p95: Option<f64>,
-    /// Mean angle between a sheet's normal and the chord of the contacts, in degrees.
-    pub angle_mean: Option<f64>,
-    /// 95th percentile of the same.
-    pub angle_p95: Option<f64>,
-}
-
-/// Sharp features of the surface, and the shares of them that the medial mesh reaches.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Features {
-    /// Length of the sharp convex edges.
-    pub convex_length: f64,
-    /// Share of it that is reached.
-    pub convex_reached: Option<f64>,
-    /// Length of the sharp concave edges.
-    pub concave_length: f64,
-    /// Share of it that is reached, which is an error.
-    pub concave_reached: Option<f64>,
-    /// Vertices with three or more sharp edges, all convex.
-    pub corners: u32,
-    /// Share of them that is reached.
-    pub corners_reached: Option<f64>,
-}
-
-/// Distances from the medial balls of surface points to the medial mesh.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Completeness {
-    /// Number of balls.
-    pub balls: u32,
-    /// Share of their centres within [`REACHED`].
-    pub found: Option<f64>,
-    /// 95th percentile of the distances.
-    pub p95: Option<f64>,
-    /// 95th percentile of the difference of the radii there.
-    pub radius_p95: Option<f64>,
-}
-
-/// Parts of a medial mesh outside of the solid.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Outside {
-    /// Edges that leave the solid.
-    pub edges: u64,
-    /// Their length outside.
-    pub length: f64,
-    /// Faces that leave the solid.
-    pub faces: u64,
-    /// Their area outside.
-    pub area: f64,
-    /// Largest distance from the surface of a point outside.
-    pub deepest: f64,
-}
 
 /// What the structure of all medial meshes is measured against: one surface.
 pub struct StructureSurface {
@@ -622,32 +462,8 @@ fn mean_and_p95(values: &[f64]) -> [Option<f64>; 2] {
 
 // Sheets of two medial meshes against each other.
 
-/// Samples of each medial mesh.
+/// Number of samples of each medial mesh.
 const MATCH_SAMPLES: usize = 4_000;
-
-/// A sheet and its partner.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SheetPair {
-    /// Areas in the first and in the second medial mesh.
-    pub areas: [f64; 2],
-    /// Share of the first sheet that is near the second one, and of the second near the first.
-    pub overlap: [f64; 2],
-}
-
-/// Sheets of two medial meshes of one solid, matched where most of each is nearest to the other.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SheetDifference {
-    /// Matched sheets, the largest of the second mesh first.
-    pub matched: Vec<SheetPair>,
-    /// Areas of sheets of the first mesh without a partner, descending.
-    pub spurious: Vec<f64>,
-    /// Areas of sheets of the second mesh without a partner, descending.
-    pub missing: Vec<f64>,
-    /// Share of the first mesh's sheet area that is spurious.
-    pub spurious_share: Option<f64>,
-    /// Share of the second mesh's sheet area that is missing.
-    pub missing_share: Option<f64>,
-}
 
 /// Matches the sheets of a medial mesh to those of a reference, both in units of the solid's diagonal.
 ///
@@ -656,7 +472,7 @@ pub struct SheetDifference {
 ///
 /// # Errors
 /// When a mesh is empty or not valid.
-pub fn sheet_difference(
+pub(super) fn sheet_difference(
     mesh: &MedialMesh,
     reference: &MedialMesh,
 ) -> Result<SheetDifference, MetricError> {

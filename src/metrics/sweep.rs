@@ -14,37 +14,38 @@
 
 use std::f64::consts::TAU;
 
-use rayon::prelude::*;
-
 use super::ascent::{Hill, Peak, Start, ascend};
+use super::bounds::{Bound, Largest, Pieces};
 use super::depth::{Boundary, DOUBT};
 use super::pieces::{
-    EXPOSED, Patches, Piece, SECTORS, burying, farthest, lateral_normal, quartered,
+    EXPOSED, Patches, Piece, SECTORS, burying, farthest, largest_distance, lateral_normal,
+    neighbours, planar_frames, quartered,
 };
 use crate::Vec3;
-use crate::complex::{Incidence, MedialUnion, Primitive};
+use crate::complex::{MedialUnion, Primitive};
+use crate::geometry::Sphere;
 use crate::geometry::planar_frame::PlanarFrame;
 use crate::surface::{TriMesh, TriangleBvh};
 
-/// Pieces that exceed the largest known distance by a smaller share are not divided, for a final figure.
+/// Excess over the largest known distance, as a share of it, below which a piece is not divided for a final figure.
 pub(super) const FINAL_SHARE: f64 = 0.005;
 
-/// Nor are those that exceed it by less than this share of the diameter.
+/// Excess over the largest known distance, as a share of the diameter, below which no piece is divided.
 const FLOOR: f64 = 1e-6;
 
-/// Pieces whose extent is a larger multiple of the largest distance are rarely bounded by it.
+/// Extent of a piece, in largest distances, above which its distance rarely bounds it.
 const COARSE: f64 = 4.0;
 
-/// Pieces that one thread bounds one after the other, each search starting from the last result.
-const RUN: usize = 256;
-
-/// Pieces for each sample, and for any number of samples.
+/// Limit of pieces for each sample.
 const PIECES: usize = 16;
+
+/// Limit of pieces for any number of samples.
 const MOST_PIECES: usize = 1 << 18;
 
-/// Peaks that are sought uphill from the largest distances of the sweep, and the first step, as a share of
-/// the largest distance.
+/// Limit of distances of the sweep from which an ascent starts.
 const SEEDS: usize = 6;
+
+/// First step of these ascents, as a share of the largest distance.
 const NARROW: f64 = 0.25;
 
 /// The peaks of both surfaces that are farther from the other one than `known` by more than a `share`, from the
@@ -66,74 +67,91 @@ pub(super) fn swept(
     [forward, reverse]
 }
 
-/// A surface to be swept.
-trait Swept: Sync {
-    /// A part of the surface.
-    type Piece: Clone + Send + Sync;
-
-    /// Bounds a piece: `None` if it does not exceed `enough`.
-    fn bound(&self, piece: &mut Self::Piece, enough: f64, near: &mut Near) -> Option<Bound>;
-
-    /// Appends pieces that together cover a piece.
-    fn divide(&self, piece: &Self::Piece, parts: &mut Vec<Self::Piece>);
-}
-
-/// Where the searches for the piece before ended: most pieces are next to it.
+/// Where the searches for the piece before ended.
 #[derive(Default)]
 struct Near {
     place: usize,
     face: Option<u32>,
 }
 
-/// A piece that may exceed the largest distance.
-#[derive(Clone, Copy)]
-struct Bound {
-    centre: Vec3,
-    /// The distance at the centre, 0 if that is not on the surface.
-    reached: f64,
-    upper: f64,
+/// Pieces that are swept: the largest ones are divided, and all distances above a known one are collected.
+struct Swept<'a, S> {
+    side: &'a S,
+    /// A piece is divided if it exceeds the largest distance by more than this share, or at least `floor`.
+    share: f64,
+    floor: f64,
+    known: f64,
+    /// Number of pieces that may still be bounded.
+    left: usize,
+    points: Vec<Vec3>,
+    values: Vec<f64>,
 }
 
 /// The peaks of one surface that are farther from the other one than `known`, at most [`SEEDS`]. Samples
-/// gave `start`, which also limits the number of pieces. The result is the same for any number of
-/// threads.
-fn peaks_above<S: Swept>(
+/// gave `start`, which also limits the number of pieces.
+fn peaks_above<S: Surface>(
     side: &S,
-    mut pieces: Vec<S::Piece>,
+    pieces: Vec<S::Piece>,
     (hill, start): (&impl Hill, &Start<'_>),
     (known, share): (f64, f64),
 ) -> Vec<Peak> {
-    let mut left = (PIECES * start.points.len()).min(MOST_PIECES);
+    let left = (PIECES * start.points.len()).min(MOST_PIECES);
     let floor = FLOOR * start.pose.diameter();
-    let enough = |largest: f64| largest + f64::max(share * largest, floor);
-    let (mut largest, mut points, mut values) = (known, Vec::new(), Vec::new());
-    while !pieces.is_empty() {
-        left = left.saturating_sub(pieces.len());
-        let limit = enough(largest);
-        let bounds = pieces.par_chunks_mut(RUN).flat_map_iter(|run| {
-            let mut near = Near::default();
-            let bounds = run.iter_mut().map(|piece| side.bound(piece, limit, &mut near));
-            bounds.collect::<Vec<_>>()
-        });
-        let bounds: Vec<Option<Bound>> = bounds.collect();
-        for bound in bounds.iter().flatten().filter(|bound| bound.reached > known) {
-            points.push(bound.centre);
-            values.push(bound.reached);
-            largest = largest.max(bound.reached);
-        }
-        let uppers = bounds.iter().map(|bound| bound.map_or(0.0, |bound| bound.upper));
-        let mut open: Vec<(f64, &S::Piece)> = uppers.zip(&pieces).collect();
-        open.retain(|&(upper, _)| upper > enough(largest));
-        if open.len() > left / 4 {
-            open.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-            open.truncate(left / 4);
-        }
-        let mut parts = Vec::with_capacity(4 * open.len());
-        open.iter().for_each(|(_, piece)| side.divide(piece, &mut parts));
-        pieces = parts;
+    let (points, values) = (Vec::new(), Vec::new());
+    let mut swept = Swept { side, share, floor, known, left, points, values };
+    let mut largest = Largest::above(known);
+    largest.search(&mut swept, pieces, usize::MAX).expect("the number of pieces is limited");
+    let (points, values) = (&swept.points[..], &swept.values[..]);
+    let spacing = NARROW * largest.lower;
+    ascend(hill, &Start { points, values, spacing, seeds: SEEDS, ..*start })
+}
+
+impl<S: Surface> Pieces for Swept<'_, S> {
+    type Piece = S::Piece;
+    type Near = Near;
+    const RUN: usize = 256;
+
+    fn begin(&mut self, pieces: &[Self::Piece], _: f64) {
+        self.left = self.left.saturating_sub(pieces.len());
     }
-    let (points, values) = (&points[..], &values[..]);
-    ascend(hill, &Start { points, values, spacing: NARROW * largest, seeds: SEEDS, ..*start })
+
+    fn enough(&self, lower: f64) -> f64 {
+        lower + f64::max(self.share * lower, self.floor)
+    }
+
+    fn bound(&self, piece: &mut Self::Piece, _: f64, enough: f64, near: &mut Near) -> Bound {
+        self.side.bound(piece, enough, near).unwrap_or(Bound::above(0.0))
+    }
+
+    fn collect(&mut self, bound: &Bound) {
+        if bound.reached > self.known {
+            self.points.push(bound.at);
+            self.values.push(bound.reached);
+        }
+    }
+
+    fn limit(&self, open: &mut Vec<(f64, &Self::Piece)>) {
+        if open.len() > self.left / 4 {
+            open.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+            open.truncate(self.left / 4);
+        }
+    }
+
+    fn divide(&self, piece: &Self::Piece, parts: &mut Vec<Self::Piece>) {
+        self.side.divide(piece, parts);
+    }
+}
+
+/// A surface to be swept.
+trait Surface: Sync {
+    /// A part of the surface.
+    type Piece: Send + Sync;
+
+    /// Bounds a piece: `None` if it does not exceed `enough`.
+    fn bound(&self, piece: &mut Self::Piece, enough: f64, near: &mut Near) -> Option<Bound>;
+
+    /// Appends pieces that together cover a piece.
+    fn divide(&self, piece: &Self::Piece, parts: &mut Vec<Self::Piece>);
 }
 
 /// The largest rise of a linear function from a point to some others.
@@ -146,7 +164,7 @@ struct SweptSurface<'a> {
     boundary: &'a Boundary<'a>,
 }
 
-impl Swept for SweptSurface<'_> {
+impl Surface for SweptSurface<'_> {
     /// A triangle, and a point outside the union that was near to the triangle that it is a part of.
     type Piece = ([Vec3; 3], Option<Vec3>);
 
@@ -183,7 +201,7 @@ impl Swept for SweptSurface<'_> {
             false => (attained_at.map_or(Vec3::ZERO, |c| c - centre), -deepest.signed),
         };
         let upper = above.max(here + rise(gradient.normalize_or_zero(), centre, corners));
-        (upper > enough).then_some(Bound { centre, reached: depth.lower, upper })
+        (upper > enough).then_some(Bound { at: centre, reached: depth.lower, upper })
     }
 
     fn divide(&self, (triangle, outside): &Self::Piece, parts: &mut Vec<Self::Piece>) {
@@ -197,10 +215,8 @@ struct SweptUnion<'a> {
     triangles: Vec<PlanarFrame>,
     union: &'a MedialUnion,
     patches: &'a Patches<'a>,
-    /// The ends of the edges at each sphere.
-    neighbours: Vec<Vec<u32>>,
-    /// The third corners of the faces at each edge.
-    opposite: Vec<Vec<u32>>,
+    /// For each sphere the other ends of its edges, and for each edge the third corners of its faces.
+    neighbours: [Vec<Vec<Sphere>>; 2],
 }
 
 /// A piece, the face that is closest to it and the primitive that is deepest there.
@@ -209,22 +225,8 @@ type Hinted = (Piece, Option<(u32, Primitive)>);
 impl<'a> SweptUnion<'a> {
     pub fn new((surface, bvh): (&TriMesh, &'a TriangleBvh), boundary: &'a Boundary<'a>) -> Self {
         let Boundary { union, patches, .. } = boundary;
-        let mesh = patches.mesh;
-        let faces = 0..surface.faces.len();
-        let triangles = faces.map(|f| PlanarFrame::new(surface.triangle(f)).0).collect();
-        let mut neighbours = vec![Vec::new(); mesh.spheres.len()];
-        for &[a, b] in &mesh.edges {
-            neighbours[a as usize].push(b);
-            neighbours[b as usize].push(a);
-        }
-        let mut opposite = vec![Vec::new(); mesh.edges.len()];
-        let incidence = Incidence::of(mesh);
-        for (&[a, b, c], sides) in mesh.faces.iter().zip(incidence.face_edges()) {
-            for (edge, corner) in sides.iter().zip([c, b, a]) {
-                opposite[*edge as usize].push(corner);
-            }
-        }
-        Self { bvh, triangles, union, patches, neighbours, opposite }
+        let neighbours = neighbours(patches.mesh);
+        Self { bvh, triangles: planar_frames(surface), union, patches, neighbours }
     }
 
     /// The initial pieces. Laterals are cut where a face begins or ends to overtop them.
@@ -261,17 +263,18 @@ impl<'a> SweptUnion<'a> {
 
     /// The spheres that can reach farther than a curved piece.
     fn others(&self, piece: &Piece) -> impl Iterator<Item = Other> {
-        let (sphere, others): (_, &[u32]) = match *piece {
+        let [at_spheres, at_edges] = &self.neighbours;
+        let (sphere, others): (_, &[Sphere]) = match *piece {
             Piece::Flat(_) => (0, &[]),
-            Piece::Round(v, _) => (v, &self.neighbours[v as usize]),
+            Piece::Round(v, _) => (v, &at_spheres[v as usize]),
             Piece::Lateral(e, ..) => {
-                (self.patches.mesh.edges[e as usize][0], &self.opposite[e as usize])
+                (self.patches.mesh.edges[e as usize][0], &at_edges[e as usize])
             }
         };
         let own = self.patches.sphere(sphere);
-        others.iter().map(move |&v| {
-            let other = self.patches.sphere(v);
-            Other { way: other.centre - own.centre, growth: other.radius - own.radius }
+        others.iter().map(move |other| Other {
+            way: other.centre - own.centre,
+            growth: other.radius - own.radius,
         })
     }
 
@@ -294,7 +297,7 @@ impl Other {
     }
 }
 
-impl Swept for SweptUnion<'_> {
+impl Surface for SweptUnion<'_> {
     type Piece = Hinted;
 
     fn bound(&self, (piece, hint): &mut Hinted, enough: f64, near: &mut Near) -> Option<Bound> {
@@ -304,23 +307,18 @@ impl Swept for SweptUnion<'_> {
         }
         let enclosure = self.patches.enclose(piece);
         let (centre, corners) = (enclosure.centre, enclosure.corners());
-        let reach = farthest(centre, corners);
+        let reach = enclosure.reach();
         if let Piece::Round(_, [a, b, c]) = *piece
             && reach > COARSE * enough
             && self.is_overtopped(piece, &[(a + b + c).normalize()])
         {
             // Too large for a bound by its distance, and buried.
-            return Some(Bound { centre, reached: 0.0, upper: f64::INFINITY });
+            return Some(Bound::above(f64::INFINITY));
         }
-        let is_buried_in =
-            |primitive| self.patches.hulls.largest_over(primitive, corners) < -EXPOSED;
-        // The distance to one triangle is convex, so its largest value is at a corner.
-        let from_face = |face: u32| {
-            let triangle = &self.triangles[face as usize];
-            corners.iter().map(|&c| triangle.distance_squared(c)).fold(0.0, f64::max).sqrt()
-        };
+        let from_face = |face: u32| largest_distance(&self.triangles[face as usize], corners);
         if let Some((face, primitive)) = *hint
-            && (is_buried_in(primitive) || from_face(face) <= enough)
+            && (self.patches.hulls.largest_over(primitive, corners) < -EXPOSED
+                || from_face(face) <= enough)
         {
             return None;
         }
@@ -334,13 +332,12 @@ impl Swept for SweptUnion<'_> {
             return None;
         }
         let deepest = self.union.deepest_or(centre, &mut near.place, burying(reach));
-        let signed = deepest.signed;
-        if signed < -EXPOSED && (signed + reach < -EXPOSED || is_buried_in(deepest.primitive)) {
+        if self.patches.hulls.bury(deepest, reach, corners) {
             return None;
         }
         *hint = Some((closest.face, deepest.primitive));
-        let reached = if signed >= -EXPOSED { distance } else { 0.0 };
-        Some(Bound { centre, reached, upper })
+        let reached = if deepest.signed >= -EXPOSED { distance } else { 0.0 };
+        Some(Bound { at: centre, reached, upper })
     }
 
     fn divide(&self, (piece, hint): &Hinted, parts: &mut Vec<Hinted>) {

@@ -10,7 +10,7 @@
 //! of one thin primitive would not touch: the corner of a box, where the radius is 0, would be a component. A gap counts
 //! as a contact only next to such a ball.
 
-use super::MetricError;
+use super::error::MetricError;
 use crate::complex::{MedialMesh, UnionError};
 use crate::geometry::{DualComplex, Sphere};
 

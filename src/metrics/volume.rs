@@ -13,7 +13,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-use super::MetricError;
+use super::error::MetricError;
 use super::samples::Pose;
 use crate::Vec3;
 use crate::complex::MedialUnion;

@@ -147,8 +147,8 @@ const BOX: f64 = 2.5;
 /// Poles nearer to the surface than this share of their radius are rejected.
 ///
 /// Their balls pass between the samples of a part that is thinner than the samples are apart, and
-/// reach far to the other side; the side of the centre says nothing of them. They are few, but can make a
-/// false handle. With too large a share thin parts lose poles that they need. The published program has no surface to ask, and estimates the same from the shape of
+/// reach far to the other side; the side of the centre is irrelevant. They are few, but can make a
+/// false handle. With too large a share thin parts lose poles that they need. The published program has no surface, and estimates the same from the shape of
 /// Voronoi cells.
 const MIN_DEPTH: f64 = 0.25;
 

@@ -101,10 +101,10 @@ impl fmt::Display for FitSource {
 pub struct Fit {
     /// From the units of the file to those of the surface.
     pub similarity: Similarity,
-    /// What the similarity is.
+    /// Origin of the similarity.
     pub source: FitSource,
-    /// Median of `|D(c) - r|` over the spheres as they stand in the file, as a fraction of the surface's diagonal; not told for
-    /// points without radii.
+    /// Median of `|D(c) - r|` over the spheres of the file, as a fraction of the surface's diagonal; absent for points
+    /// without radii.
     pub misfit_before: Option<f64>,
     /// The same after the similarity.
     pub misfit: Option<f64>,
@@ -144,18 +144,20 @@ const DOUBTFUL: f64 = 0.01;
 /// Largest median misfit of needed units that are exact: without a free parameter, they fit no other surface by chance.
 const FITTING: f64 = 0.05;
 
-/// Most spheres and points of the surface for a fit, evenly taken from their lists.
+/// Limit of spheres for a fit, evenly taken from their list.
 const SPHERES: usize = 4000;
+
+/// Limit of points of the surface for a fit, evenly taken from their list.
 const POINTS: usize = 1000;
 
 /// Factors between units of length: of millimetres, centimetres, decimetres and metres, inches to millimetres, centimetres
 /// and feet, feet to millimetres and metres.
 const FACTORS: [f64; 8] = [1000.0, 100.0, 10.0, 25.4, 2.54, 12.0, 304.8, 0.3048];
 
-/// How many times nearer to the surface a similarity must bring the union to be needed.
+/// Factor by which a similarity must bring the union nearer to the surface to be needed.
 const NEARER: f64 = 2.0;
 
-/// Steps of the optimisation; far fewer are needed where there is an optimum to be found.
+/// Limit of steps of the optimisation. Where there is an optimum, far fewer suffice.
 const STEPS: usize = 60;
 
 /// Largest ratio of the mean distance of a preferred convention to that of the optimum, whose four parameters follow the
@@ -168,7 +170,7 @@ const CLOSE: f64 = 1e-3;
 /// First and last step of the search for the nearest union, as fractions of the scale and of the diagonal.
 const SEARCH_STEPS: [f64; 2] = [0.05, 1e-4];
 
-/// The share of centres that must lie in the solid for units to be believed of points without radii.
+/// Least share of centres in the solid from which the units of points without radii are accepted.
 const INSIDE: f64 = 0.95;
 
 impl Shape {
@@ -358,7 +360,7 @@ impl Surface {
     /// The distances of points of the surface to the union of a medial mesh in input units.
     fn nearness(&self, mesh: &MedialMesh) -> Nearness<'_> {
         let units = self.units;
-        let normal = mesh.transformed(1.0 / units.diagonal, |p| units.forward(p));
+        let normal = mesh.to_normal(&units);
         Nearness { union: MedialUnion::new(&normal).ok(), points: &self.points }
     }
 
@@ -408,7 +410,7 @@ impl Surface {
         spheres.par_iter().map(|s| self.residual(&similarity.sphere(s)).0).collect()
     }
 
-    /// The mean of `|D(c) - r|` in the unit of the file: in that of the surface, what is shrunk to a point of it would fit.
+    /// The mean of `|D(c) - r|` in the unit of the file. In that of the surface, spheres shrunk to one of its points would fit.
     fn mean(&self, spheres: &[Sphere], similarity: &Similarity) -> f64 {
         let sum: f64 = self.residuals(spheres, similarity).iter().map(|e| e.abs()).sum();
         sum / spheres.len().max(1) as f64 / similarity.scale
@@ -590,7 +592,7 @@ mod tests {
         let shape = Shape::new("block", &mesh, report, options).unwrap();
         let normal = *shape.normalisation();
         let initial = shape.initial().unwrap();
-        let axis = initial.transformed(normal.diagonal, |p| normal.backward(p));
+        let axis = initial.to_input(&normal);
         (shape, axis)
     }
 
@@ -663,7 +665,7 @@ mod tests {
         let report = validate(&mesh).unwrap();
         let shape = Shape::new("corner", &mesh, report, ShapeOptions::default()).unwrap();
         let normal = *shape.normalisation();
-        let axis = shape.initial().unwrap().transformed(normal.diagonal, |p| normal.backward(p));
+        let axis = shape.initial().unwrap().to_input(&normal);
         for scale in [1000.0, 25.4] {
             let written = axis.transformed(1.0 / scale, |p| p / scale);
             let fit = shape.fit_if_needed(&written).unwrap().expect("other units");
@@ -697,7 +699,7 @@ mod tests {
             ShapeOptions { sampling: "vertices".parse().unwrap(), ..ShapeOptions::default() };
         let shape = Shape::new("bar", &bar, report, options).unwrap();
         let normal = *shape.normalisation();
-        let initial = shape.initial().unwrap().transformed(normal.diagonal, |p| normal.backward(p));
+        let initial = shape.initial().unwrap().to_input(&normal);
         assert!(shape.misfit(&initial).unwrap().unwrap() > 0.4);
         assert_eq!(shape.fit_if_needed(&initial).unwrap(), None);
         assert_eq!(shape.fit(&initial).unwrap().source, FitSource::Units);

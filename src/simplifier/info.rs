@@ -32,7 +32,7 @@ pub struct MethodInfo {
     pub citation: Text,
     /// The same source as a BibTeX entry; empty where there is no publication.
     pub bibtex: Text,
-    /// One sentence on what the method does.
+    /// One sentence on the algorithm.
     pub summary: Text,
     /// The method's own level, where it has a scalar one.
     pub native: Option<NativeLevel>,
@@ -40,12 +40,12 @@ pub struct MethodInfo {
     /// from fine to coarse, with levels of one kind after one preparation, and the seconds of a level
     /// are those of all calls up to it. The seconds of other methods are those of each call alone.
     pub incremental: bool,
-    /// Whether results depend on [`RunContext::seed`](crate::simplifier::RunContext::seed).
+    /// Whether results depend on [`RunContext::seed`].
     pub seeded: bool,
-    /// Whether there is one result for each shape, at [`Level::Published`](crate::simplifier::Level::Published)
+    /// Whether there is one result for each shape, at [`Level::Published`]
     /// alone.
     pub fixed: bool,
-    /// Meaning of [`Level::Published`](crate::simplifier::Level::Published) here.
+    /// Meaning of [`Level::Published`] here.
     pub published: Text,
     /// Parameters, in the order of the paper.
     pub params: Vec<ParamInfo>,
@@ -141,7 +141,7 @@ pub struct NativeLevel {
 }
 
 impl NativeLevel {
-    /// A level of which a larger value leaves fewer spheres.
+    /// A level at which a larger value leaves fewer spheres.
     pub fn larger_is_coarser(name: impl Into<Text>, unit: impl Into<Text>) -> Self {
         Self {
             name: name.into(),
@@ -149,11 +149,6 @@ impl NativeLevel {
             larger_is_coarser: true,
             is_error_bound: false,
         }
-    }
-
-    /// A level of which a larger value leaves more spheres.
-    pub fn larger_is_finer(name: impl Into<Text>, unit: impl Into<Text>) -> Self {
-        Self { larger_is_coarser: false, ..Self::larger_is_coarser(name, unit) }
     }
 }
 

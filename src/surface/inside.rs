@@ -263,7 +263,7 @@ pub struct SignedDistance<'a> {
 }
 
 impl<'a> SignedDistance<'a> {
-    /// For a closed, consistently oriented surface, of which both have to be made.
+    /// For a closed, consistently oriented surface with this tree and test.
     pub fn closed(tree: &'a TriangleBvh, inside: &'a InsideTest) -> Self {
         Self { tree, inside }
     }

@@ -5,10 +5,10 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use super::check::orient_and_examine;
-use super::read::PolygonSoup;
-use super::read::content;
+use super::format::content;
 use super::repair::repair;
 use super::report::{Fault, Repair, VertexName};
+use super::soup::PolygonSoup;
 use super::topology::Topology;
 use super::{Format, Loaded, SurfaceError, TriMesh, accept, examine, in_file};
 use crate::Vec3;

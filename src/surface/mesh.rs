@@ -6,7 +6,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::read::Format;
+use super::format::Format;
 use super::report::{Fault, SurfaceError};
 use crate::Vec3;
 use crate::atomic::write_atomically;

@@ -13,32 +13,36 @@ mod check;
 mod closest;
 mod contract;
 mod creases;
+mod format;
 mod inside;
+mod intersections;
 mod mend;
 mod mesh;
+mod obj;
+mod off;
 pub(crate) mod ply;
-mod read;
 mod repair;
 mod report;
 mod sample;
 mod shrinking_ball;
+mod soup;
+mod stl;
+mod text;
 mod topology;
 
 use std::path::Path;
-
-use serde::Serialize;
 
 use crate::Vec3;
 
 pub use closest::{BvhError, Closest, Feature, TriangleBvh, Vicinity};
 pub use contract::{Contraction, Folds, contract_short_edges, crust_surface};
 pub use creases::{SharpEdge, sharp_edges, smooth_normals};
+pub use format::Format;
 pub use inside::{InsideTest, Side, SignedDistance};
 pub use mend::{Components, MendOptions, mend, mend_bytes};
 #[cfg(test)]
 pub(crate) use mesh::fixtures;
 pub use mesh::{Normalisation, TriMesh, write};
-pub use read::Format;
 pub use report::{Fault, Place, Repair, SurfaceError, SurfaceReport, VertexName};
 pub use sample::{ParseSamplingError, Sampling, sample, sample_with_faces};
 pub use shrinking_ball::{Ball, End, Touched, shrinking_ball};
@@ -53,21 +57,27 @@ pub struct Loaded {
 }
 
 /// A surface of any kind, as far as it could be examined: the output of `medial info`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Inspection {
+    /// The triangles after the repairs of [`read`], oriented as far as that is possible.
+    pub mesh: TriMesh,
     /// Findings and repairs.
-    #[serde(flatten)]
     pub report: SurfaceReport,
     /// The error of [`read`] for this surface, if any.
-    #[serde(serialize_with = "as_message")]
     pub refused: Option<SurfaceError>,
 }
 
-fn as_message<S: serde::Serializer>(
-    refused: &Option<SurfaceError>,
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    refused.as_ref().map(ToString::to_string).serialize(serializer)
+impl Inspection {
+    /// The surface, if it bounds a solid.
+    ///
+    /// # Errors
+    /// [`Inspection::refused`].
+    pub fn solid(self) -> Result<Loaded, SurfaceError> {
+        match self.refused {
+            Some(error) => Err(error),
+            None => Ok(Loaded { mesh: self.mesh, report: self.report }),
+        }
+    }
 }
 
 /// Reads a surface, repairs it and checks it. The extension decides the format (`.off`, `.obj`,
@@ -90,40 +100,16 @@ fn as_message<S: serde::Serializer>(
 /// ```
 pub fn read(path: impl AsRef<Path>) -> Result<Loaded, SurfaceError> {
     let path = path.as_ref();
-    load(path).and_then(accept).map_err(|fault| in_file(path, fault))
+    inspect(path, &content(path)?)?.solid()
 }
 
-/// Reads a surface that need not bound a solid, such as one that a simplifier tore: the triangles
-/// after the same repairs, oriented as far as that is possible. The bytes are those of the file
-/// `path`, which is not opened.
-///
-/// # Errors
-/// When the bytes do not match the extension, or have no triangle with an area.
-pub fn read_any(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Loaded, SurfaceError> {
-    let path = path.as_ref();
-    let examined = Format::of(path).and_then(|format| examine(bytes, format));
-    let examined = examined.map_err(|fault| in_file(path, fault))?;
-    Ok(Loaded { mesh: examined.mesh, report: examined.report })
-}
-
-/// The bytes of a surface file, for [`read_content`].
+/// The bytes of a surface file, for [`inspect`].
 ///
 /// # Errors
 /// When it cannot be read, or is no regular file.
 pub fn content(path: impl AsRef<Path>) -> Result<Vec<u8>, SurfaceError> {
     let path = path.as_ref();
-    read::content(path).map_err(|fault| in_file(path, fault))
-}
-
-/// [`read`] for the bytes of the file `path`, which is not opened: hash and mesh of the same bytes
-/// cannot differ.
-///
-/// # Errors
-/// As [`read`].
-pub fn read_content(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Loaded, SurfaceError> {
-    let path = path.as_ref();
-    let examined = Format::of(path).and_then(|format| examine(bytes, format));
-    examined.and_then(accept).map_err(|fault| in_file(path, fault))
+    format::content(path).map_err(|fault| in_file(path, fault))
 }
 
 /// [`read`] for the content of a file.
@@ -134,16 +120,16 @@ pub fn read_bytes(bytes: &[u8], format: Format) -> Result<Loaded, SurfaceError> 
     Ok(examine(bytes, format).and_then(accept)?)
 }
 
-/// Examines a surface that may be unfit for [`read`].
+/// Examines the bytes of the file `path`, which is not opened: hash and mesh of the same bytes cannot differ.
 ///
 /// # Errors
-/// When the file cannot be read or understood, or holds no face. A surface that is open,
-/// non-manifold or otherwise rejected is no error here; see [`Inspection::refused`].
-pub fn inspect(path: impl AsRef<Path>) -> Result<Inspection, SurfaceError> {
+/// When the bytes do not match the extension, or have no triangle with an area. A surface that is open, non-manifold or
+/// otherwise rejected is no error here; see [`Inspection::refused`].
+pub fn inspect(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Inspection, SurfaceError> {
     let path = path.as_ref();
-    let examined = load(path).map_err(|fault| in_file(path, fault))?;
-    let refused = examined.fault.map(|fault| in_file(path, fault));
-    Ok(Inspection { report: examined.report, refused })
+    let examined = Format::of(path).and_then(|format| examine(bytes, format));
+    let check::Examined { mesh, report, fault } = examined.map_err(|fault| in_file(path, fault))?;
+    Ok(Inspection { mesh, report, refused: fault.map(|fault| in_file(path, fault)) })
 }
 
 /// [`read`] for arrays: the same repairs, the same orientation, the same refusals.
@@ -164,7 +150,7 @@ pub fn inspect(path: impl AsRef<Path>) -> Result<Inspection, SurfaceError> {
 /// # Ok::<(), surface::SurfaceError>(())
 /// ```
 pub fn read_triangles(vertices: &[Vec3], faces: &[[u32; 3]]) -> Result<Loaded, SurfaceError> {
-    let soup = read::PolygonSoup::of_triangles(vertices, faces)?;
+    let soup = soup::PolygonSoup::of_triangles(vertices, faces)?;
     Ok(accept(check::orient_and_examine(repair::repair(soup)?))?)
 }
 
@@ -192,13 +178,8 @@ pub fn validate(mesh: &TriMesh) -> Result<SurfaceReport, SurfaceError> {
     Ok(check::examine_unrepaired(mesh)?)
 }
 
-fn load(path: &Path) -> Result<check::Examined, Fault> {
-    let format = Format::of(path)?;
-    examine(&read::content(path)?, format)
-}
-
 fn examine(bytes: &[u8], format: Format) -> Result<check::Examined, Fault> {
-    let repaired = repair::repair(read::parse(bytes, format)?)?;
+    let repaired = repair::repair(format::parse(bytes, format)?)?;
     Ok(check::orient_and_examine(repaired))
 }
 

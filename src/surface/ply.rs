@@ -18,8 +18,9 @@ use ply_rs_bw::ply::{
     ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType,
 };
 
-use super::read::{Cursor, count};
 use super::report::{Fault, Place};
+use super::soup::{PolygonSoup, checked_index};
+use super::text::{Cursor, count, quote};
 use crate::parser_message;
 
 /// The values of one row that matter here, each 0 where the header does not declare it.
@@ -228,5 +229,43 @@ fn fault(at: Place, expected: &str, error: &ParseError) -> Fault {
     let text = text.split_once(": ").filter(|_| text.starts_with("Line ")).map_or(&*text, |t| t.1);
     let parts: Vec<&str> = text.splitn(3, "\n\t").take(2).map(str::trim).collect();
     let found = parser_message(&parts.join(" ")).chars().take(MOST).collect();
+    Fault::Syntax { at, expected: expected.to_owned(), found }
+}
+
+/// The vertices and faces of a PLY file.
+pub(super) fn parse(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
+    let file = header(bytes)?;
+    let vertices = file.count("vertex");
+    if file.elements.iter().any(|element| element.name == "tristrips") {
+        let what = "PLY triangle strips are not read; export the surface as faces";
+        return Err(Fault::Unsupported(what.into()));
+    }
+    if ["x", "y", "z"].iter().any(|axis| !file.has("vertex", &[axis])) {
+        return Err(missing_in(&file, "element vertex with x, y and z before it"));
+    }
+    if !file.elements.iter().any(|element| element.name == "face") {
+        return Err(Fault::NoFaces { vertices });
+    }
+    if !file.has("face", &["vertex_indices", "vertex_index"]) {
+        return Err(missing_in(&file, "a list vertex_indices in element face before it"));
+    }
+    let mut soup = PolygonSoup::default();
+    file.rows(|element, row, at, values| match element {
+        "vertex" => {
+            soup.push_vertex(*values.numbers.first_chunk().unwrap_or(&[0.0; 3]), || at.clone())
+        }
+        "face" => {
+            for &corner in &values.corners {
+                soup.corners.push(checked_index(corner.into(), vertices, at, row)?);
+            }
+            soup.end_polygon(if let Place::Line(line) = *at { Some(line) } else { None })
+        }
+        _ => Ok(()),
+    })?;
+    Ok(soup)
+}
+
+fn missing_in(file: &Ply<'_>, expected: &str) -> Fault {
+    let (at, found) = (Place::Line(file.line - 1), quote(b"end_header"));
     Fault::Syntax { at, expected: expected.to_owned(), found }
 }

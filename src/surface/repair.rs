@@ -17,8 +17,8 @@
 use std::collections::HashMap;
 
 use super::mesh::Unit;
-use super::read::PolygonSoup;
 use super::report::{Fault, Repair};
+use super::soup::PolygonSoup;
 use super::topology::Topology;
 use crate::Vec3;
 use crate::geometry::predicates::{Point2, Sign, orient2d, project};

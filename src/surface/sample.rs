@@ -99,8 +99,7 @@ impl FromStr for Sampling {
 }
 
 impl Sampling {
-    /// So many points of the same kind and seed; blue noise where the kind has a number of its
-    /// own, as the vertices have. `count` is at least 1.
+    /// `count` points, at least 1, of the same kind and seed; blue noise in place of the kinds that start from the vertices.
     pub fn with_count(self, count: usize) -> Self {
         match self {
             Self::Conforming { .. } | Self::MeshVertices => Self::BlueNoise { count, seed: 0 },
@@ -150,7 +149,7 @@ impl fmt::Display for Sampling {
 /// Candidates for each point of blue noise, as C. Yuksel recommends.
 const CANDIDATES: usize = 5;
 
-/// Samples a surface. Exactly as many points as asked, in the unit of the mesh; none if the mesh
+/// Samples a surface. Exactly the requested number of points, in the unit of the mesh; none if the mesh
 /// has no area. `conforming` gives the vertices.
 ///
 /// # Panics
@@ -273,8 +272,13 @@ impl<'a> Areas<'a> {
 //   sides are sampled independently, which a Voronoi diagram needs to separate them.
 // - Of equally heavy samples the one with the smaller index is removed.
 
+/// Exponent of the weight of a neighbour by its distance, as in the paper.
 const ALPHA: i32 = 8;
+
+/// Factor of the least distance, as in the paper.
 const BETA: f64 = 0.65;
+
+/// Exponent of the share of samples that stay, as in the paper.
 const GAMMA: f64 = 1.5;
 
 /// Indices, ascending, of the `count` points to keep. Points are in a unit in which neither their

@@ -6,8 +6,8 @@
 
 use std::ops::ControlFlow;
 
-use super::check::Intersections;
 use super::inside::{Crossing, InsideTest};
+use super::intersections::Intersections;
 use super::mesh::Unit;
 use super::report::Repair;
 use crate::Vec3;
@@ -188,7 +188,7 @@ fn corner_at(faces: &[[u32; 3]], half_edge: u32, vertex: u32) -> u32 {
 // 1. Within a component all faces follow the first one (breadth over common edges).
 // 2. A component is turned by the sign of the volume it encloses. A volume within its own
 //    rounding error counts as none and is rejected.
-// 3. A component is a cavity if it lies in an odd number of others (see [`super::nesting`]).
+// 3. A component is a cavity if it lies in an odd number of others (see [`shells`]).
 
 /// How a component is oriented, and how it should be.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,16 +6,15 @@
 
 use Symmetry::{Broken, Shared};
 use medial::Vec3;
-use medial::complex::{MedialMesh, Sphere, betti, euler};
+use medial::complex::{MedialMesh, Sphere};
 use medial::metrics::{
-    AxisOptions, Certificate, DistanceOptions, Distances, Evaluation, Judge, JudgeOptions, Truth,
-    axis_distance, certify, counts, distances, spikes, triangle_quality,
+    Certificate, DistanceOptions, Evaluation, Judge, JudgeOptions, Truth, certify, distances,
 };
 use medial::surface::{InsideTest, TriMesh, TriangleBvh};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::shapes;
 
@@ -83,67 +82,42 @@ fn motions() -> [Motion; 4] {
     ]
 }
 
-fn measured(surface: &TriMesh, mesh: &MedialMesh) -> Distances {
-    let bvh = TriangleBvh::new(surface).unwrap();
-    let options = DistanceOptions { surface_samples: 5_000, envelope_samples: 5_000, seed: 3 };
-    distances(surface, &bvh, mesh, &options).unwrap()
-}
-
 fn interval(surface: &TriMesh, mesh: &MedialMesh, tolerance: f64) -> Certificate {
     certify(surface, &TriangleBvh::new(surface).unwrap(), mesh, tolerance).unwrap()
 }
 
-#[test]
-fn nothing_changes_when_both_are_moved_and_scaled() {
-    let (surface, mesh, other) = (solid(), axis(1), axis(2));
-    let before = measured(&surface, &mesh);
-    let options = AxisOptions { samples: 2_000, seed: 1 };
-    let apart = axis_distance(&mesh, &other, &options).unwrap();
-    let quality = triangle_quality(&mesh);
-    for motion in motions() {
-        let Motion { scale, shift, .. } = motion;
-        let (moved, moved_mesh) = (motion.surface(&surface), motion.medial(&mesh));
-        let after = measured(&moved, &moved_mesh);
-        let same = |a: f64, b: f64, what: &str| {
-            assert!((a - b).abs() <= 1e-9, "{what}: {a} {b}, scale {scale}, shift {shift}");
-        };
-        let d = |of: fn(&Distances) -> f64, what: &str| same(of(&before), of(&after) / scale, what);
-        d(|d| d.epsilon, "epsilon");
-        d(|d| d.epsilon_union, "epsilon_union");
-        d(|d| d.mean, "mean");
-        d(|d| d.rms, "rms");
-        d(|d| d.p95, "p95");
-        d(|d| d.p99, "p99");
-        d(|d| d.spheres_only, "spheres_only");
-        d(|d| d.reverse, "reverse");
-        d(|d| d.reverse_mean, "reverse_mean");
-        d(|d| d.hausdorff, "hausdorff");
-        assert_eq!(before.reverse_samples, after.reverse_samples);
+/// Every number of an evaluation without intervals, with the sheets against a reference and the known axis `truth`.
+fn everything(surface: &TriMesh, mesh: &MedialMesh, [truth, reference]: [&MedialMesh; 2]) -> Value {
+    let truth = Truth { betti: Some([1, 0, 0]), axis: Some(truth.clone()), diagonal: 1.0 };
+    let judge = judge(surface, truth, 3_000, 4);
+    let sheets = judge.sheet_difference(mesh, reference).unwrap();
+    json!({ "evaluation": judge.evaluate(mesh).unwrap(), "sheets": sheets })
+}
 
-        let moved_other = motion.medial(&other);
-        let moved_apart = axis_distance(&moved_mesh, &moved_other, &options).unwrap();
-        for (a, b) in
-            [(apart.in_space, moved_apart.in_space), (apart.with_radius, moved_apart.with_radius)]
-        {
-            same(a.computed_to_true_max, b.computed_to_true_max / scale, "axis, max");
-            same(a.computed_to_true_mean, b.computed_to_true_mean / scale, "axis, mean");
-            same(a.true_to_computed_max, b.true_to_computed_max / scale, "axis back, max");
-            same(a.true_to_computed_mean, b.true_to_computed_mean / scale, "axis back, mean");
+#[test]
+fn every_number_of_an_evaluation_moves_with_the_shape() {
+    let (surface, mesh, others) = (solid(), axis(1), [axis(2), axis(3)]);
+    let before = everything(&surface, &mesh, others.each_ref());
+    let measured = |surface: &TriMesh, mesh: &MedialMesh| {
+        let options = DistanceOptions { surface_samples: 5_000, envelope_samples: 5_000, seed: 3 };
+        let found = distances(surface, &TriangleBvh::new(surface).unwrap(), mesh, &options);
+        serde_json::to_value(found.unwrap()).unwrap()
+    };
+    let plain = measured(&surface, &mesh);
+    for motion in motions() {
+        // Judges measure in units of the diagonal, which is 1 here.
+        let Motion { rotation, scale, shift } = motion;
+        let unit = Motion { rotation, scale: 1.0, shift: shift / scale };
+        let moved = others.each_ref().map(|other| unit.medial(other));
+        let after = everything(&unit.surface(&surface), &unit.medial(&mesh), moved.each_ref());
+        assert_alike(&before, &after, "evaluation", 1e-9);
+        // Distances alone have the unit of their arguments.
+        let after = measured(&motion.surface(&surface), &motion.medial(&mesh));
+        for (key, value) in plain.as_object().unwrap() {
+            let factor = if key.ends_with("samples") { 1.0 } else { scale };
+            let after = after[key].as_f64().unwrap() / factor;
+            assert!((value.as_f64().unwrap() - after).abs() <= 1e-9, "{key}: {value} {after}");
         }
-        let moved_quality = triangle_quality(&moved_mesh);
-        same(quality.min_angle_mean.unwrap(), moved_quality.min_angle_mean.unwrap(), "angles");
-        same(quality.max_angle_mean.unwrap(), moved_quality.max_angle_mean.unwrap(), "angles");
-        assert_eq!(quality.below_30, moved_quality.below_30);
-        // Lengths within the spike measures are fractions of the diagonal.
-        let unit = moved_mesh.transformed(1.0 / scale, |p| p / scale);
-        let (spikes, moved_spikes) = (spikes(&mesh), spikes(&unit));
-        assert_eq!(spikes.idle_spheres, moved_spikes.idle_spheres);
-        assert_eq!((spikes.fins, spikes.dangling_edges), (moved_spikes.fins, 1));
-        for (a, b) in spikes.by_ratio.iter().zip(&moved_spikes.by_ratio) {
-            assert_eq!((a.edge_share, a.spikes), (b.edge_share, b.spikes));
-            same(a.length_share, b.length_share, "length share");
-        }
-        assert_eq!((betti(&mesh), euler(&mesh)), (betti(&moved_mesh), euler(&moved_mesh)));
     }
 }
 
@@ -249,20 +223,6 @@ fn symmetries_of_the_shape_do_not_matter() {
     }
 }
 
-#[test]
-fn the_structure_moves_with_the_surface() {
-    let (surface, mesh) = (solid(), axis(1));
-    let structure = |surface: &TriMesh, mesh: &MedialMesh| {
-        serde_json::to_value(judged(surface, mesh).structure).unwrap()
-    };
-    let before = structure(&surface, &mesh);
-    // Thresholds are fractions of the diagonal, which is 1 here.
-    for motion in motions().into_iter().filter(|motion| motion.scale == 1.0) {
-        let after = structure(&motion.surface(&surface), &motion.medial(&mesh));
-        assert_alike(&before, &after, "structure", 1e-9);
-    }
-}
-
 /// The exact distance behind the certificate is invariant: the intervals before and after share a
 /// value, however narrow they are.
 #[test]
@@ -292,20 +252,19 @@ fn renumbered(mesh: &MedialMesh, rng: &mut Pcg64) -> MedialMesh {
 
 #[test]
 fn renumbering_changes_nothing_at_all() {
-    let (surface, mesh) = (solid(), axis(1));
-    let judge_of = |surface: &TriMesh| {
-        let truth = Truth { betti: Some([1, 0, 0]), axis: Some(axis(2)), diagonal: 1.0 };
-        judge(surface, truth, 3_000, 4)
+    let (surface, mesh, truth, reference) = (solid(), axis(1), axis(2), axis(3));
+    let list = mesh.spheres_alone();
+    let measured = |mesh: &MedialMesh, list: &MedialMesh, reference: &MedialMesh| {
+        let judge = judge(&surface, Truth::default(), 3_000, 4);
+        let intervals = [mesh, list].map(|m| judge.evaluate_certified(m, Some(1e-3)).unwrap());
+        json!({ "all": everything(&surface, mesh, [&truth, reference]), "intervals": intervals })
     };
-    let judge = judge_of(&surface);
-    let (before, certified) = (judge.evaluate(&mesh).unwrap(), judge.certify(&mesh, 1e-3).unwrap());
+    let before = measured(&mesh, &list, &reference);
     let mut rng = Pcg64::seed_from_u64(5);
     for _ in 0..5 {
-        let other = renumbered(&mesh, &mut rng);
-        assert_ne!(other, mesh);
-        assert_eq!(judge.evaluate(&other).unwrap(), before);
-        assert_eq!(judge.certify(&other, 1e-3).unwrap(), certified);
-        assert_eq!(counts(&other), counts(&mesh));
+        let [mesh, list, reference] =
+            [&mesh, &list, &reference].map(|mesh| renumbered(mesh, &mut rng));
+        assert_eq!(measured(&mesh, &list, &reference), before);
     }
     // The vertices of the surface in another order, its faces as they were.
     let mut order: Vec<u32> = (0..surface.vertices.len() as u32).collect();
@@ -316,7 +275,7 @@ fn renumbering_changes_nothing_at_all() {
     }
     let faces = surface.faces.iter().map(|f| f.map(|v| order[v as usize])).collect();
     let moved = TriMesh { vertices, faces };
-    assert_eq!(judge_of(&moved).evaluate(&mesh).unwrap(), before);
+    assert_eq!(everything(&moved, &mesh, [&truth, &reference]), before["all"]);
     // Its faces in another order, each from another corner. A point above an edge has a closest point
     // in either face, and the two differ by rounding.
     let mut shuffled = surface.clone();
@@ -324,10 +283,15 @@ fn renumbering_changes_nothing_at_all() {
     for face in &mut shuffled.faces {
         face.rotate_left(rng.random_range(0..3));
     }
-    let after = judge_of(&shuffled).evaluate(&mesh).unwrap();
-    let [before, after] =
-        [before, after].map(|evaluation| serde_json::to_value(evaluation).unwrap());
-    assert_alike(&before, &after, "evaluation", 1e-12);
+    let after = everything(&shuffled, &mesh, [&truth, &reference]);
+    assert_alike(&before["all"], &after, "evaluation", 1e-12);
+    // The simplices of the medial mesh in another order, each from another corner.
+    let (mut edges, mut faces) = (mesh.edges.clone(), mesh.faces.clone());
+    edges.iter_mut().for_each(|edge| edge.reverse());
+    edges.shuffle(&mut rng);
+    faces.iter_mut().for_each(|face| face.rotate_left(1));
+    faces.shuffle(&mut rng);
+    assert_eq!(MedialMesh::from_simplices(mesh.spheres.clone(), edges, faces).unwrap(), mesh);
 }
 
 /// Equal but for numbers, which may differ by rounding.

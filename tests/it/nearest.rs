@@ -233,7 +233,7 @@ fn union_distances_match_brute_force() {
             assert!((signed[k] - sigma).abs() < 1e-14, "{} for {sigma}", signed[k]);
             assert!((nearest[k] - mu).abs() < 1e-14, "{} for {mu}", nearest[k]);
             assert_eq!(union.signed(p), signed[k]);
-            assert_eq!(union.unsigned_nearest(p), nearest[k]);
+            assert_eq!(union.nearest_surface(p).signed.abs(), nearest[k]);
             let of = |primitive| all.iter().find(|s| s.0 == primitive).unwrap().1;
             assert!((of(union.deepest(p).primitive) - sigma).abs() < 1e-14);
             assert!((of(union.nearest_surface(p).primitive).abs() - mu).abs() < 1e-14);
@@ -338,7 +338,7 @@ fn nearly_coincident_balls_are_distinguished() {
             // As far as two of the balls can be apart, in centre and radius; equal ones are equal.
             let most = if spread > 1e-13 { 0.0 } else { 5.0 * spread };
             assert!((union.signed(p) - sigma).abs() <= most, "{spread}, {p}");
-            assert!((union.unsigned_nearest(p) - mu).abs() <= most, "{spread}, {p}");
+            assert!((union.nearest_surface(p).signed.abs() - mu).abs() <= most, "{spread}, {p}");
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod adapters;
 mod check;
+mod circles;
 mod cli;
 mod cli_compare;
 mod cli_simplify;

@@ -48,7 +48,7 @@ fn results(mesh: &TriMesh, lambda: f64) -> Vec<MedialMesh> {
             method.prepare(&shape, &Params::none(), &RunContext::default()).expect("prepared");
         all.push(filter.at(Level::Native(level)).expect("a level in range").mesh);
     }
-    all.iter().map(|m| m.transformed(normal.diagonal, |p| normal.backward(p))).collect()
+    all.iter().map(|m| m.to_input(&normal)).collect()
 }
 
 /// The same complex with its spheres in the order of their radii.

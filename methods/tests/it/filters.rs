@@ -261,7 +261,7 @@ fn variants_of_voronoi_facets_refuse_a_given_mesh() {
     let shape = shape_of(&mesh);
     let shape = {
         let back = *shape.normalisation();
-        shape_of(&mesh).with_initial(&given.transformed(back.diagonal, |p| back.backward(p)))
+        shape_of(&mesh).with_initial(&given.to_input(&back))
     };
     for (method, set) in [("angle", ANGLE[0]), ("angle", ANGLE[3]), ("lambda", LAMBDA[0])] {
         let method = medial_methods::find(method).expect("registered");

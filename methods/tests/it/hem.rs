@@ -39,7 +39,7 @@ fn errors(mesh: &MedialMesh, samples: &[Vec3]) -> [f64; 2] {
         distances.fold(f64::INFINITY, f64::min)
     };
     let depth = samples.iter().map(|&p| union.signed(p).abs());
-    let surface = samples.iter().map(|&p| union.unsigned_nearest(p).min(to_sphere(p)));
+    let surface = samples.iter().map(|&p| union.nearest_surface(p).signed.abs().min(to_sphere(p)));
     [depth.fold(0.0, f64::max), surface.fold(0.0, f64::max)]
 }
 

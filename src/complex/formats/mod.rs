@@ -115,7 +115,7 @@ pub enum MaErrorKind {
     /// Reading or writing failed.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// The format cannot hold this mesh, or no such values.
+    /// The format cannot hold this mesh or these values.
     #[error("{0}")]
     Unwritable(String),
     /// The mesh to be written is not in canonical form.

@@ -675,6 +675,56 @@ mod tests {
         }
     }
 
+    /// Name, text with `\n` at the end of each line, and the beginning of the error after the name.
+    const ERRORS: &str = r#"x.csv =>  => : no spheres
+x.csv => x,y,z,r\n => : no spheres
+x.csv => x,y,z\n0,0,0\n => , line 1: no column r (found "x,y,z"
+x.csv => x,y,z,r\n0,0,0\n => , line 2: 3 fields instead of 4 (found "0,0,0")
+x.csv => x,y,z,r\n0,0,0,\n => , line 2: the r "" is not a finite number
+x.csv => x,y,z,r\n\n0,0,nan,1\n => , line 3: the z "nan" is not a finite number
+x.csv => 0,0,,1\n => , line 1: the z "" is not a finite number
+x.csv => 0,0,0,1,5\n => , line 1: 5 fields instead of 4
+x.csv => x;y;z;r\n1,5;2,5;3,5;1,25\n => , line 2: the x "1,5" is not a finite number; write
+x.csv => x;y;z;r\n1;2;3;1,25\n => , line 2: the r "1,25" is not a finite number; write
+x.csv => 0;0;0;1\n0;0;0;1,5\n => , line 2: the r "1,5" is not
+x.csv => x,y,z,r\n1,5,2,5,3,5,1,25\n => , line 2: 8 fields instead of 4
+x.csv => x,y,z,r\n1,500,2,3,4\n => , line 2: 5 fields instead of 4
+x.csv => x,y,z,r\n"1,500",2,3,4\n => , line 2: 5 fields instead of 4
+x.csv => 0,0,0,1\n1,000,0,0,1\n => , line 2: 5 fields instead of 4
+x.csv => x;y;z;r\n1,2,3,4\n => , line 2: 1 fields instead of 4
+x.csv => x,y,z,r\n1;2;3;4\n => , line 2: 1 fields instead of 4
+x.csv => x;y;z;r\n1 500;2;3;4\n => , line 2: the x "1 500" is not
+x.txt => x y z r\n1,5 2,5 3,5 1,25\n => , line 1: expected three counts
+x.xyzr => 0 0 0 1\n0 0 0 1\n1 000 0 0 1\n => , line 3: 5 fields instead of 4
+x.xyzr => 0 0 0 1\n0 0 1 inf\n => , line 2: the r "inf" is not
+x.json =>  => , line 1: EOF
+x.json => {\n] => , line 2:
+x.json => {"a": []} => : no spheres
+x.json => 3 => : no spheres
+x.json => {"a": [{"center": [0, 0, 0]}]} => : a, sphere 1: the radius is missing
+x.json => {"a": [{"center": [0, 0], "radius": 1}]} => : a, sphere 1: the center [0,0] is not
+x.json => {"a": [{"center": [0, 0, "0"], "radius": 1}]} => : a, sphere 1: the z "0" is not
+x.json => [{"center": [0, 0, 0], "radius": 1e999}] => , line 1: number out of range
+x.json => {"a": [],\n"a": []} => , line 2: duplicate key "a"
+x.json => {"a": {"b": 1, "b": 1}} => , line 1: duplicate key "b"
+x.json => [{"center": [0, 0, 0], "radius": 1, "radius": 2}] => , line 1: duplicate key "radius"
+x.yaml => a:\n  - center: [0, 0, 0]\n    radius: .nan\n => : a, sphere 1: the radius ".nan" is not a finite number
+x.yaml => a: [\n => , line
+x.yaml => a: 1\na: 2\n => , line 2: duplicate mapping key `a` is not allowed here
+x.yaml => a: 1\n---\nb: 2\n => , line 3: only single YAML document expected
+x.yaml => ~: 1\n => , line 1: null is not allowed here
+x.yaml => collision_spheres: spheres/franka.yml\n => : no spheres
+x.yaml => a:\n  - {center: [0, 0, 0], radius: -1}\n => : no spheres (found 1 with a negative radius)
+x.urdf => <robot>\n<link>\n</robot> => , line 3:
+x.urdf => <sdf/> => : unknown root element (found "sdf", expected robot or mujoco)
+x.urdf => <!DOCTYPE r [<!ENTITY a 'b'>]><robot/> => , line 1:
+x.urdf => <robot>\n<link><collision><geometry><sphere/></geometry></collision></link></robot> => , line 2: the radius is missing
+x.urdf => <robot><link><collision><geometry><mesh/></geometry></collision></link></robot> => : no spheres (found 1 other shapes)
+x.xml => <mujoco><worldbody><geom type='sphere' size='1' pos='0 0'/></worldbody></mujoco> => , line 1: the position "0 0" is not three numbers
+x.xml => <mujoco><worldbody><geom mesh='m'/><geom fromto='0 0 0 0 0 1' size='1'/></worldbody></mujoco> => : no spheres (found 2 other shapes)
+x.xml => <mujoco><default><geom type='box'/></default><worldbody><geom size='1'/></worldbody></mujoco> => : no spheres (found 1 other shapes)
+x.xml => <mujoco><worldbody>\n<geom/></worldbody></mujoco> => , line 2: the radius is missing"#;
+
     #[test]
     fn faults_are_errors_with_their_place() {
         let deep_json = "[".repeat(100_000);
@@ -684,125 +734,7 @@ mod tests {
                     c: &c [*b, *b, *b, *b, *b, *b, *b, *b, *b]\nd: &d [*c, *c, *c, *c, *c, *c, *c, *c, *c]\n\
                     e: &e [*d, *d, *d, *d, *d, *d, *d, *d, *d]\nf: &f [*e, *e, *e, *e, *e, *e, *e, *e, *e]\n\
                     g: &g [*f, *f, *f, *f, *f, *f, *f, *f, *f]\nh: [*g, *g, *g, *g, *g, *g, *g, *g, *g]\n";
-        for (name, text, expected) in [
-            ("x.csv", "", ": no spheres"),
-            ("x.csv", "x,y,z,r\n", ": no spheres"),
-            ("x.csv", "x,y,z\n0,0,0\n", ", line 1: no column r (found \"x,y,z\""),
-            ("x.csv", "x,y,z,r\n0,0,0\n", ", line 2: 3 fields instead of 4 (found \"0,0,0\")"),
-            ("x.csv", "x,y,z,r\n0,0,0,\n", ", line 2: the r \"\" is not a finite number"),
-            ("x.csv", "x,y,z,r\n\n0,0,nan,1\n", ", line 3: the z \"nan\" is not a finite number"),
-            ("x.csv", "0,0,,1\n", ", line 1: the z \"\" is not a finite number"),
-            ("x.csv", "0,0,0,1,5\n", ", line 1: 5 fields instead of 4"),
-            // Decimal commas and separators of thousands.
-            (
-                "x.csv",
-                "x;y;z;r\n1,5;2,5;3,5;1,25\n",
-                ", line 2: the x \"1,5\" is not a finite number; write",
-            ),
-            (
-                "x.csv",
-                "x;y;z;r\n1;2;3;1,25\n",
-                ", line 2: the r \"1,25\" is not a finite number; write",
-            ),
-            ("x.csv", "0;0;0;1\n0;0;0;1,5\n", ", line 2: the r \"1,5\" is not"),
-            ("x.csv", "x,y,z,r\n1,5,2,5,3,5,1,25\n", ", line 2: 8 fields instead of 4"),
-            ("x.csv", "x,y,z,r\n1,500,2,3,4\n", ", line 2: 5 fields instead of 4"),
-            ("x.csv", "x,y,z,r\n\"1,500\",2,3,4\n", ", line 2: 5 fields instead of 4"),
-            ("x.csv", "0,0,0,1\n1,000,0,0,1\n", ", line 2: 5 fields instead of 4"),
-            ("x.csv", "x;y;z;r\n1,2,3,4\n", ", line 2: 1 fields instead of 4"),
-            ("x.csv", "x,y,z,r\n1;2;3;4\n", ", line 2: 1 fields instead of 4"),
-            ("x.csv", "x;y;z;r\n1 500;2;3;4\n", ", line 2: the x \"1 500\" is not"),
-            ("x.txt", "x y z r\n1,5 2,5 3,5 1,25\n", ", line 1: expected three counts"),
-            ("x.xyzr", "0 0 0 1\n0 0 0 1\n1 000 0 0 1\n", ", line 3: 5 fields instead of 4"),
-            ("x.xyzr", "0 0 0 1\n0 0 1 inf\n", ", line 2: the r \"inf\" is not"),
-            ("x.json", "", ", line 1: EOF"),
-            ("x.json", "{\n]", ", line 2: "),
-            ("x.json", "{\"a\": []}", ": no spheres"),
-            ("x.json", "3", ": no spheres"),
-            (
-                "x.json",
-                "{\"a\": [{\"center\": [0, 0, 0]}]}",
-                ": a, sphere 1: the radius is missing",
-            ),
-            (
-                "x.json",
-                "{\"a\": [{\"center\": [0, 0], \"radius\": 1}]}",
-                ": a, sphere 1: the center [0,0] is not",
-            ),
-            (
-                "x.json",
-                "{\"a\": [{\"center\": [0, 0, \"0\"], \"radius\": 1}]}",
-                ": a, sphere 1: the z \"0\" is not",
-            ),
-            (
-                "x.json",
-                "[{\"center\": [0, 0, 0], \"radius\": 1e999}]",
-                ", line 1: number out of range",
-            ),
-            ("x.json", &deep_json, ", line 1: recursion limit"),
-            ("x.json", "{\"a\": [],\n\"a\": []}", ", line 2: duplicate key \"a\""),
-            ("x.json", "{\"a\": {\"b\": 1, \"b\": 1}}", ", line 1: duplicate key \"b\""),
-            (
-                "x.json",
-                "[{\"center\": [0, 0, 0], \"radius\": 1, \"radius\": 2}]",
-                ", line 1: duplicate key \"radius\"",
-            ),
-            (
-                "x.yaml",
-                "a:\n  - center: [0, 0, 0]\n    radius: .nan\n",
-                ": a, sphere 1: the radius \".nan\" is not a finite number",
-            ),
-            ("x.yaml", "a: [\n", ", line "),
-            ("x.yaml", "a: 1\na: 2\n", ", line 2: duplicate mapping key `a` is not allowed here"),
-            ("x.yaml", "a: 1\n---\nb: 2\n", ", line 3: only single YAML document expected"),
-            ("x.yaml", "~: 1\n", ", line 1: null is not allowed here"),
-            ("x.yaml", "collision_spheres: spheres/franka.yml\n", ": no spheres"),
-            (
-                "x.yaml",
-                "a:\n  - {center: [0, 0, 0], radius: -1}\n",
-                ": no spheres (found 1 with a negative radius)",
-            ),
-            ("x.yaml", &deep_yaml, ", line 1: YAML document too large or too complex"),
-            ("x.yaml", bomb, ", line 3: YAML document too large or too complex"),
-            ("x.urdf", "<robot>\n<link>\n</robot>", ", line 3: "),
-            (
-                "x.urdf",
-                "<sdf/>",
-                ": unknown root element (found \"sdf\", expected robot or mujoco)",
-            ),
-            ("x.urdf", "<!DOCTYPE r [<!ENTITY a 'b'>]><robot/>", ", line 1: "),
-            (
-                "x.urdf",
-                "<robot>\n<link><collision><geometry><sphere/></geometry></collision></link></robot>",
-                ", line 2: the radius is missing",
-            ),
-            (
-                "x.urdf",
-                "<robot><link><collision><geometry><mesh/></geometry></collision></link></robot>",
-                ": no spheres (found 1 other shapes)",
-            ),
-            (
-                "x.xml",
-                "<mujoco><worldbody><geom type='sphere' size='1' pos='0 0'/></worldbody></mujoco>",
-                ", line 1: the position \"0 0\" is not three numbers",
-            ),
-            (
-                "x.xml",
-                "<mujoco><worldbody><geom mesh='m'/><geom fromto='0 0 0 0 0 1' size='1'/></worldbody></mujoco>",
-                ": no spheres (found 2 other shapes)",
-            ),
-            (
-                "x.xml",
-                "<mujoco><default><geom type='box'/></default><worldbody><geom size='1'/></worldbody></mujoco>",
-                ": no spheres (found 1 other shapes)",
-            ),
-            (
-                "x.xml",
-                "<mujoco><worldbody>\n<geom/></worldbody></mujoco>",
-                ", line 2: the radius is missing",
-            ),
-            ("x.xml", &deep_xml, ""),
-        ] {
+        let check = |name: &str, text: &str, expected: &str| {
             let error = load(name, text).map(|loaded| loaded.mesh).unwrap_err().to_string();
             assert!(
                 error.starts_with(&format!("{name}{expected}")),
@@ -810,6 +742,22 @@ mod tests {
                 text
             );
             assert!(error.lines().count() == 1 && error.len() < 400, "{error}");
+        };
+        // Decimal commas and separators of thousands are errors, too.
+        for case in ERRORS.lines() {
+            let case = case.replace("\\n", "\n");
+            let [name, text, expected] = case.splitn(3, " => ").collect::<Vec<_>>()[..] else {
+                panic!("{case}");
+            };
+            check(name, text, expected);
+        }
+        for (name, text, expected) in [
+            ("x.json", &*deep_json, ", line 1: recursion limit"),
+            ("x.yaml", &deep_yaml, ", line 1: YAML document too large or too complex"),
+            ("x.yaml", bomb, ", line 3: YAML document too large or too complex"),
+            ("x.xml", &deep_xml, ""),
+        ] {
+            check(name, text, expected);
         }
         assert!(read_content("x.urdf", b"\xff", ReadOptions::default()).is_err());
         assert!(read_content("x.yaml", b"\xff", ReadOptions::default()).is_err());

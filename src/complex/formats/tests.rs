@@ -237,90 +237,73 @@ fn disorder_is_repaired_and_reported() {
 type Parser = fn(Vec<u8>, &str, ReadOptions) -> Result<LoadedMa, MaError>;
 
 /// Each text is rejected with an error that begins with this text.
-fn refuses(parse: Parser, options: ReadOptions, cases: &[(&str, &str)]) {
+fn refuses<S: AsRef<str>>(parse: Parser, options: ReadOptions, cases: &[(S, &str)]) {
     for (text, expected) in cases {
+        let text = text.as_ref();
         let error = parse(text.as_bytes().to_vec(), "x", options).expect_err(text).to_string();
         assert!(error.starts_with(&format!("x{expected}")), "{text:?} gives {error:?}");
     }
 }
 
+/// Texts, in which `\n` ends a line, with the beginnings of their errors.
+const MA_ERRORS: &str = r#" => : the file is empty
+# only\n => : the file is empty
+7 5\n => , line 1: expected three counts
+OFF\n => , line 1: expected three counts
+-1 0 0\n => , line 1: expected three counts
+1 0 0 0 0\nv 0 0 0 1\n => , line 1: expected three counts
+4000000000 0 0\nv 0 0 0 1\n => , line 1: the header announces 4000000000 spheres
+1 99999999999999 0\nv 0 0 0 1\n => , line 1: the header announces 99999999999999 edges
+99999999999\n0 0 0 1\n => , line 1: the header announces 99999999999 spheres
+2 0 0\nv 0 0 0 1\n => : the header announces 2 spheres, the file holds only 1
+1 0 0\nv 0 0 0 1\nv 0 0 0 1\n => , line 3: the header announces 1 spheres
+2 1 0\nv 0 0 0 1\nv 0 0 0 1\ne 0 1\ne 0 1\n => , line 5: the header announces 1 edges, the file holds at least 2
+4 1 1\nv 0 0 0 1 2 0\nv 1 0 0 1 2 0\ne 0 1 0\n => : the header announces 4 spheres, the file holds only 2
+2\n0 0 0 1\n => : the header announces 2 spheres
+1\n0 0 0 1\n1 0 0 1\n => , line 3: the header announces 1 spheres
+v 0 0 0 1\ne 0 0\n => , line 2: a list of spheres alone
+3 2\n0 0 0\n1 0 0\n => , line 1: points without radii: `--radii surface` takes
+1 0 0\nv 0 0 1\n => , line 2: the radius is missing
+1 0 0\nv 0 0 zero 1\n => , line 2: the z coordinate "zero" is not a finite number
+1 0 0\nv nan 0 0 1\n => , line 2: the x coordinate "nan"
+1 0 0\nv 0 inf 0 1\n => , line 2: the y coordinate "inf"
+1 0 0\nv 0 0 0 1e999\n => , line 2: the radius "1e999"
+1 1 0\nv 0 0 0 1\ne 0 1\n => , line 3: "1" is not one of the 1 spheres; indices start at 0
+1 1 0\nv 0 0 0 1\ne 0 -1\n => , line 3: "-1" is not one of the 1 spheres
+1 1 0\nv 0 0 0 1\ne 0\n => , line 3: the index of a sphere is missing
+1 0 0\nv 0 0 0 1\nt 0 0 0 0\n => , line 3: expected a line that starts with v, e or f
+1 0 0\nv 0 0 0 1 2 0 0 0\n => , line 2: "2 0 0 0" behind the values
+1 0 0\nv 0 0 0 1 2 x\n => , line 2: the flag "x" is not a finite number
+1 0 0\nv 0 0 0 1 2 0.5\n => , line 2: the flag "0.5" is not a whole number
+1 0 1\nv 0 0 0 1\nf 0 0 0 7\n => , line 3: a face has three spheres
+4 0 1\nv 0 0 0 0\nv 1 0 0 0\nv 0 1 0 0\nv 0 0 1 0\nf 0 2 1\n => : every radius is 0
+1 0 0\nv 0 0 0 1\n1\n0 0 1\n0\n => , line 3: expected the parts
+1 0 0\nv 0 0 0 1\n1\n0 4 0\n => , line 3: expected the parts
+1 0 0\nv 0 0 0 1\n2\n0 3 1\n0\n => , line 3: expected the parts
+1 0 0\nv 0 0 0 1\n1\n0 3 1\n0 7\n => , line 3: expected the parts
+1 0 0\nv 0 0 0 1\n1\n0 3 18446744073709551615\n => , line 3: expected the parts"#;
+const OBJ_ERRORS: &str = r#"v 0 0 0 1\nl 1\n => , line 2: the index of a sphere is missing
+v 0 0 0 1\nl 0 1\n => , line 2: "0" is not one of the 1 vertices above
+v 0 0 0 1\nl 1 -2\n => , line 2: "-2" is not one
+v 0 0 0 1\nf 1 1 1 1\n => , line 2: faces must be triangles, found 4 corners
+v 0 0 0 1 2 3\n => , line 1: a vertex has 4 numbers
+v 0 0 0\n => , line 1: points without radii
+v 0 0 0 1\ncurv 1\n => , line 2: expected a line that starts with v, l or f
+v 0 0 x 1\n => , line 1: the z coordinate"#;
+
+fn cases(table: &'static str) -> Vec<(String, &'static str)> {
+    let cases = table.lines().map(|case| case.split_once(" => ").expect(case));
+    cases.map(|(text, error)| (text.replace("\\n", "\n"), error)).collect()
+}
+
 #[test]
 fn errors_name_the_line_and_the_reason() {
     let default = ReadOptions::default();
-    refuses(
-        parse_ma,
-        default,
-        &[
-            ("", ": the file is empty"),
-            ("# only\n", ": the file is empty"),
-            ("7 5\n", ", line 1: expected three counts"),
-            ("OFF\n", ", line 1: expected three counts"),
-            ("-1 0 0\n", ", line 1: expected three counts"),
-            ("1 0 0 0 0\nv 0 0 0 1\n", ", line 1: expected three counts"),
-            ("4000000000 0 0\nv 0 0 0 1\n", ", line 1: the header announces 4000000000 spheres"),
-            (
-                "1 99999999999999 0\nv 0 0 0 1\n",
-                ", line 1: the header announces 99999999999999 edges",
-            ),
-            ("99999999999\n0 0 0 1\n", ", line 1: the header announces 99999999999 spheres"),
-            ("2 0 0\nv 0 0 0 1\n", ": the header announces 2 spheres, the file holds only 1"),
-            ("1 0 0\nv 0 0 0 1\nv 0 0 0 1\n", ", line 3: the header announces 1 spheres"),
-            (
-                "2 1 0\nv 0 0 0 1\nv 0 0 0 1\ne 0 1\ne 0 1\n",
-                ", line 5: the header announces 1 edges, the file holds at least 2",
-            ),
-            (
-                "4 1 1\nv 0 0 0 1 2 0\nv 1 0 0 1 2 0\ne 0 1 0\n",
-                ": the header announces 4 spheres, the file holds only 2",
-            ),
-            ("2\n0 0 0 1\n", ": the header announces 2 spheres"),
-            ("1\n0 0 0 1\n1 0 0 1\n", ", line 3: the header announces 1 spheres"),
-            ("v 0 0 0 1\ne 0 0\n", ", line 2: a list of spheres alone"),
-            ("3 2\n0 0 0\n1 0 0\n", ", line 1: points without radii: `--radii surface` takes"),
-            ("1 0 0\nv 0 0 1\n", ", line 2: the radius is missing"),
-            ("1 0 0\nv 0 0 zero 1\n", ", line 2: the z coordinate \"zero\" is not a finite number"),
-            ("1 0 0\nv nan 0 0 1\n", ", line 2: the x coordinate \"nan\""),
-            ("1 0 0\nv 0 inf 0 1\n", ", line 2: the y coordinate \"inf\""),
-            ("1 0 0\nv 0 0 0 1e999\n", ", line 2: the radius \"1e999\""),
-            (
-                "1 1 0\nv 0 0 0 1\ne 0 1\n",
-                ", line 3: \"1\" is not one of the 1 spheres; indices start at 0",
-            ),
-            ("1 1 0\nv 0 0 0 1\ne 0 -1\n", ", line 3: \"-1\" is not one of the 1 spheres"),
-            ("1 1 0\nv 0 0 0 1\ne 0\n", ", line 3: the index of a sphere is missing"),
-            (
-                "1 0 0\nv 0 0 0 1\nt 0 0 0 0\n",
-                ", line 3: expected a line that starts with v, e or f",
-            ),
-            ("1 0 0\nv 0 0 0 1 2 0 0 0\n", ", line 2: \"2 0 0 0\" behind the values"),
-            ("1 0 0\nv 0 0 0 1 2 x\n", ", line 2: the flag \"x\" is not a finite number"),
-            ("1 0 0\nv 0 0 0 1 2 0.5\n", ", line 2: the flag \"0.5\" is not a whole number"),
-            ("1 0 1\nv 0 0 0 1\nf 0 0 0 7\n", ", line 3: a face has three spheres"),
-            ("4 0 1\nv 0 0 0 0\nv 1 0 0 0\nv 0 1 0 0\nv 0 0 1 0\nf 0 2 1\n", ": every radius is 0"),
-            ("1 0 0\nv 0 0 0 1\n1\n0 0 1\n0\n", ", line 3: expected the parts"),
-            ("1 0 0\nv 0 0 0 1\n1\n0 4 0\n", ", line 3: expected the parts"),
-            ("1 0 0\nv 0 0 0 1\n2\n0 3 1\n0\n", ", line 3: expected the parts"),
-            ("1 0 0\nv 0 0 0 1\n1\n0 3 1\n0 7\n", ", line 3: expected the parts"),
-            ("1 0 0\nv 0 0 0 1\n1\n0 3 18446744073709551615\n", ", line 3: expected the parts"),
-        ],
-    );
+    refuses(parse_ma, default, &cases(MA_ERRORS));
     refuses(parse_ma, STRICT, &[("1 0 0\nv 0 0 0 -3\n", ", line 2: the radius -3 is negative")]);
     let wrong = PLAIN.replace("3 3 1", "2 3 1").replace("e 1 2", "e 1 7");
     refuses(parse_ma, LENIENT, &[(&wrong, ", line 7: \"7\" is not one of the 3 spheres")]);
-    refuses(
-        parse_obj,
-        default,
-        &[
-            ("v 0 0 0 1\nl 1\n", ", line 2: the index of a sphere is missing"),
-            ("v 0 0 0 1\nl 0 1\n", ", line 2: \"0\" is not one of the 1 vertices above"),
-            ("v 0 0 0 1\nl 1 -2\n", ", line 2: \"-2\" is not one"),
-            ("v 0 0 0 1\nf 1 1 1 1\n", ", line 2: faces must be triangles, found 4 corners"),
-            ("v 0 0 0 1 2 3\n", ", line 1: a vertex has 4 numbers"),
-            ("v 0 0 0\n", ", line 1: points without radii"),
-            ("v 0 0 0 1\ncurv 1\n", ", line 2: expected a line that starts with v, l or f"),
-            ("v 0 0 x 1\n", ", line 1: the z coordinate"),
-        ],
-    );
+    refuses(parse_obj, default, &cases(OBJ_ERRORS));
     let valid = ply("radius");
     for (from, to, expected) in [
         ("ply", "solid", ": line 1: expected a PLY header, found"),

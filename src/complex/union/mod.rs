@@ -12,12 +12,12 @@
 //! Each edge is evaluated once, not once for every face: the sides of a face are edges of the mesh, so
 //! a face adds only the part between its two tangent triangles. A sphere with an edge lies in the
 //! edge's cone. If several primitives have the same spheres up to rounding, only one is evaluated
-//! ([`coincident`]).
+//! ([`Distinct`]).
 
 use std::collections::HashSet;
 
 use rayon::prelude::*;
-use search::{Nearer, Part, Parts, Shape, Signed, Unsigned};
+use search::{Nearer, Part, Parts, Reading, Shape, Signed, Unsigned};
 
 use super::{ComplexError, MedialMesh};
 use crate::Vec3;
@@ -177,9 +177,15 @@ impl MedialUnion {
     /// `sigma(p)`, searched from the primitive that the last call with the same `near` found. Faster
     /// for consecutive nearby points; the result is the same.
     pub(crate) fn signed_from(&self, p: Vec3, near: &mut usize) -> f64 {
-        let (nearest, place) = self.parts.nearest::<Signed>(p, *near);
+        self.nearest_from::<Signed>(p, near, f64::NEG_INFINITY).signed
+    }
+
+    /// The nearest primitive by a reading of the distance, or any that is near enough. Begins with the one at `near`,
+    /// which is then the place of the one that was found.
+    fn nearest_from<R: Reading>(&self, p: Vec3, near: &mut usize, enough: f64) -> NearestPrimitive {
+        let (nearest, place) = self.parts.nearest_or::<R>(p, *near, enough);
         *near = place;
-        nearest.signed
+        nearest
     }
 
     /// The signed distance to the primitive at a place alone; infinite where the cones of a slab's sides decide.
@@ -190,9 +196,7 @@ impl MedialUnion {
     /// The primitive of least signed distance, searched as in [`signed_from`](Self::signed_from), or any whose
     /// distance is at most `enough`.
     pub(crate) fn deepest_or(&self, p: Vec3, near: &mut usize, enough: f64) -> NearestPrimitive {
-        let (nearest, place) = self.parts.nearest_or::<Signed>(p, *near, enough);
-        *near = place;
-        nearest
+        self.nearest_from::<Signed>(p, near, enough)
     }
 
     /// The primitive of least signed distance, searched as in [`signed_from`](Self::signed_from), and the
@@ -202,9 +206,8 @@ impl MedialUnion {
         p: Vec3,
         near: &mut usize,
     ) -> (NearestPrimitive, Option<Vec3>) {
-        let (nearest, place) = self.parts.nearest::<Signed>(p, *near);
-        *near = place;
-        (nearest, self.parts.shape(place).nearest_centre(p).map(|(_, centre)| centre))
+        let nearest = self.nearest_from::<Signed>(p, near, f64::NEG_INFINITY);
+        (nearest, self.parts.shape(*near).nearest_centre(p).map(|(_, centre)| centre))
     }
 
     /// A point of the union's boundary near to `p`, searched as in [`signed_from`](Self::signed_from).
@@ -213,9 +216,8 @@ impl MedialUnion {
     pub(crate) fn boundary_near(&self, p: Vec3, burial: f64, near: &mut usize) -> Option<Vec3> {
         let mut point = p;
         for _ in 0..MAX_EXITS {
-            let (nearest, place) = self.parts.nearest::<Signed>(point, *near);
-            *near = place;
-            let (signed, centre) = self.parts.shape(place).nearest_centre(point)?;
+            let nearest = self.nearest_from::<Signed>(point, near, f64::NEG_INFINITY);
+            let (signed, centre) = self.parts.shape(*near).nearest_centre(point)?;
             if (-burial..=burial).contains(&signed) {
                 return Some(point);
             }
@@ -225,16 +227,10 @@ impl MedialUnion {
         (self.signed_from(point, near) >= -burial).then_some(point)
     }
 
-    /// `mu(p)`: the least distance to the surface of a primitive, buried or not.
-    pub fn unsigned_nearest(&self, p: Vec3) -> f64 {
-        self.nearest_surface(p).signed.abs()
-    }
-
-    /// `mu(p)`, begun as in [`signed_from`](Self::signed_from).
+    /// `mu(p)`: the least distance to the surface of a primitive, buried or not. Begun as in
+    /// [`signed_from`](Self::signed_from).
     pub(crate) fn unsigned_from(&self, p: Vec3, near: &mut usize) -> f64 {
-        let (nearest, place) = self.parts.nearest::<Unsigned>(p, *near);
-        *near = place;
-        nearest.signed.abs()
+        self.nearest_from::<Unsigned>(p, near, f64::NEG_INFINITY).signed.abs()
     }
 
     /// The primitive of least signed distance.
@@ -249,20 +245,13 @@ impl MedialUnion {
 
     /// [`signed`](Self::signed) for many points, in their order, in parallel.
     pub fn signed_batch(&self, points: &[Vec3]) -> Vec<f64> {
-        in_morton_order(points, |last: &mut usize, p| {
-            let (nearest, place) = self.parts.nearest::<Signed>(p, *last);
-            *last = place;
-            nearest.signed
-        })
+        in_morton_order(points, |last: &mut usize, p| self.signed_from(p, last))
     }
 
-    /// [`unsigned_nearest`](Self::unsigned_nearest) for many points, in their order, in parallel.
+    /// `mu`, the distances to the [nearest surfaces](Self::nearest_surface), for many points, in their order, in
+    /// parallel.
     pub fn unsigned_nearest_batch(&self, points: &[Vec3]) -> Vec<f64> {
-        in_morton_order(points, |last: &mut usize, p| {
-            let (nearest, place) = self.parts.nearest::<Unsigned>(p, *last);
-            *last = place;
-            nearest.signed.abs()
-        })
+        in_morton_order(points, |last: &mut usize, p| self.unsigned_from(p, last))
     }
 
     /// [`deepest`](Self::deepest) for many points, in their order, in parallel. Each search begins with the
@@ -303,9 +292,8 @@ impl MedialUnion {
     /// ball on the primitive that attains it, with the place of that primitive.
     pub(crate) fn deepest_ball_batch(&self, points: &[Vec3]) -> Vec<(f64, f64, u32)> {
         in_morton_order(points, |last: &mut usize, p| {
-            let (nearest, place) = self.parts.nearest::<Signed>(p, *last);
-            *last = place;
-            (nearest.signed, self.parts.shape(place).radius_towards(p), place as u32)
+            let signed = self.signed_from(p, last);
+            (signed, self.parts.shape(*last).radius_towards(p), *last as u32)
         })
     }
 

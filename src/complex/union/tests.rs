@@ -105,7 +105,11 @@ fn results_are_those_of_all_primitives() {
                 let first = own().filter(|part| part.0 == least).map(|part| part.1).min();
                 assert_eq!(Some(deepest.primitive), first, "{kind}, {count}, {p}");
                 let nearest = own().map(|part| part.0.abs()).fold(f64::INFINITY, f64::min);
-                assert_eq!(union.unsigned_nearest(p).to_bits(), nearest.to_bits(), "{kind}, {p}");
+                assert_eq!(
+                    union.nearest_surface(p).signed.abs().to_bits(),
+                    nearest.to_bits(),
+                    "{kind}, {p}"
+                );
                 let depth = least + vector(&mut rng).x * 1e-7;
                 assert_eq!(union.buries(p, -depth), least < depth, "{kind}, {count}, {p}");
                 let below = union.below_batch(&[p], &[depth])[0].map(|found| found.signed);

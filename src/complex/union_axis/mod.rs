@@ -13,16 +13,15 @@
 //!    (file `corners.rs`).
 //! 2. *Sectors*: the triangles at an edge `ij` of `K` leave gaps and enclose solid sectors. The
 //!    corners at the two sides of a sector are on the circle of `i` and `j`, and the edge is part of
-//!    their Voronoi facet: on one side of it, in the sector, that facet is inside `K` or outside
-//!    (file `sectors.rs`).
+//!    their Voronoi facet: on one side of it, in the sector, that facet is inside `K` or outside.
+//!    They are in `corners.rs`, too.
 //! 3. Delaunay triangulation of `V`. The Voronoi vertex of a cell whose corners share a ball is that
 //!    ball's centre. A Voronoi edge whose corners share a ball passes through that ball's centre, and
 //!    only there does it cross the boundary of `K`; where they share two it runs along an edge of `K`.
-//!    So all other Voronoi edges join vertices on one side, and the sectors decide on which
-//!    (file `sides.rs`).
+//!    So all other Voronoi edges join vertices on one side, and the sectors decide on which.
 //! 4. The part of each Voronoi facet inside `K` is bounded by Voronoi edges inside, as far as the
 //!    first ball centre on them, and by the solid sectors, among which a singular triangle is one of
-//!    no width. These sides, directed, close up to polygons (file `facets.rs`).
+//!    no width. These sides, directed, close up to polygons.
 //! 5. The polygons with the singular edges and vertices of `K` are the axis. Radii: of a ball at its
 //!    centre, the distance to the corners at a Voronoi vertex.
 //!
@@ -35,7 +34,7 @@
 //! Unperturbed polar balls are out of scope. They meet in samples by construction, but only up to
 //! rounding: rounding decides their dual complex, and their other corners lie where spheres nearly
 //! touch. The axis of such balls falls into many pieces, even with the samples in place of the corners.
-//! With radii times 1.002 and slightly moved centres (`methods/perturb.rs`) facets close up.
+//! With radii times 1.002 and slightly moved centres facets close up.
 //!
 //! Deviations from the papers
 //!

@@ -11,7 +11,7 @@
 //! | 2 | 2^126 | 10 |
 //! | 3 | 2^1279, that is any two coordinates below 2^190 | 100 |
 //!
-//! Before tier 3, each axis is tried on a separate quantum (file `axes.rs`).
+//! Before tier 3, each axis is tried on a separate quantum.
 //!
 //! Compared with floating-point expansions: no branch depends on the data beyond the choice of
 //! the tier, exact zeros (cospherical points) cost no more than other values, and nothing overflows

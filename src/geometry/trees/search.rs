@@ -44,7 +44,7 @@ impl<F: FnMut(Range<usize>) -> f64> Search for Around<F> {
 impl Tree {
     /// Shows the leaves to `visit`, roughly from near `p` to far, as places in [`Tree::order`].
     /// Boxes whose squared distance from `p` exceeds the limit are skipped: `limit` at first, then
-    /// what `visit` returned last.
+    /// the last result of `visit`.
     #[inline]
     pub fn search_around(&self, p: Vec3, limit: f64, visit: impl FnMut(Range<usize>) -> f64) {
         self.search(&mut Around { p, limit, visit });

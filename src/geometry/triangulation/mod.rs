@@ -302,7 +302,7 @@ mod tests {
         cells
     }
 
-    /// Rounds of so many sites are divided, however many of them have to be deferred.
+    /// Divides rounds of at least `smallest` sites, for any number of deferred ones.
     fn always_from(smallest: u32) -> Division {
         Division { smallest, most_deferred: (1, 1) }
     }

@@ -8,8 +8,7 @@
 mod balls;
 mod similarity;
 
-use std::collections::{BTreeMap, HashMap};
-use std::hash::Hash;
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Instant;
 
@@ -85,13 +84,13 @@ struct Store {
 struct OfSamples {
     /// Whether the cost is work of the method that requests it, rather than of shared substrates.
     is_of_asker: bool,
-    samples: Cache<Sampling, Arc<[Vec3]>>,
-    delaunay: Cache<Sampling, Arc<Triangulated>>,
-    cells: Cache<Sampling, Arc<CellSpheres>>,
-    centred: Cache<Sampling, Arc<CellSpheres>>,
-    facets: Cache<Sampling, Arc<VoronoiFacets>>,
-    medial: Cache<Sampling, Arc<MedialMesh>>,
-    balls: Cache<Sampling, Arc<InnerBalls>>,
+    samples: Slot<Arc<[Vec3]>>,
+    delaunay: Slot<Arc<Triangulated>>,
+    cells: Slot<Arc<CellSpheres>>,
+    centred: Slot<Arc<CellSpheres>>,
+    facets: Slot<Arc<VoronoiFacets>>,
+    medial: Slot<Arc<MedialMesh>>,
+    balls: Slot<Arc<InnerBalls>>,
 }
 
 /// The samples with their Delaunay triangulation.
@@ -141,14 +140,14 @@ const LEAST_BUDGET: usize = 20_000;
 /// The part that does not depend on the samples.
 #[derive(Default)]
 struct OfSurface {
-    tree: Cache<(), Arc<TriangleBvh>>,
-    inside: Cache<(), Arc<InsideTest>>,
+    tree: Slot<Arc<TriangleBvh>>,
+    inside: Slot<Arc<InsideTest>>,
 }
 
 impl Shape {
     /// Normalises a closed, oriented surface and opens a first view on it.
     ///
-    /// `report` is what [`crate::surface::validate`] or [`crate::surface::read`] said of `mesh`.
+    /// `report` is that of [`crate::surface::validate`] or [`crate::surface::read`] for `mesh`.
     ///
     /// # Errors
     /// [`ShapeError::Extent`] when the bounding box has no finite positive diagonal.
@@ -178,8 +177,7 @@ impl Shape {
     /// The shape with another initial medial mesh, in input units.
     /// [`Shape::initial`] refuses one without a sphere, and one that is not valid once normalised.
     pub fn with_initial(mut self, initial: &MedialMesh) -> Self {
-        let to_normal = self.store.normalisation;
-        let mesh = initial.transformed(1.0 / to_normal.diagonal, |p| to_normal.forward(p));
+        let mesh = initial.to_normal(&self.store.normalisation);
         self.given = Some(match mesh.check() {
             Ok(()) if mesh.spheres.is_empty() => Err(ShapeError::EmptyInitial),
             Ok(()) => Ok(Arc::new(mesh)),
@@ -267,15 +265,6 @@ impl Shape {
         sum
     }
 
-    fn take<T>(
-        &self,
-        substrate: Substrate,
-        (built, used): (Result<T, ShapeError>, Use),
-    ) -> Result<T, ShapeError> {
-        self.note(substrate, used);
-        built
-    }
-
     fn note(&self, substrate: Substrate, used: Use) {
         let mut all = self.used.lock().expect("no panic while held");
         // The first use decides whether it was built here.
@@ -283,7 +272,7 @@ impl Shape {
     }
 }
 
-/// Why a substrate could not be built.
+/// Reason why a substrate is not built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShapeError {
     /// The bounding box is empty, flat to a point, or not finite.
@@ -383,13 +372,13 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// Does `work` and says what it cost.
+    /// The result of `work` with its cost.
     pub fn of<T>(work: impl FnOnce() -> T) -> (T, Self) {
         Self::clocked(|| usage_of(work))
     }
 
-    /// As [`Cost::of`], for a substrate: what it needs while it is built counts as its own, not as
-    /// that of the work that requests it.
+    /// As [`Cost::of`], for a substrate: memory while it is built counts as its own, not as that of the work that
+    /// requests it.
     fn of_substrate<T>(work: impl FnOnce() -> T) -> (T, Self) {
         Self::clocked(|| usage_apart(work))
     }
@@ -431,47 +420,8 @@ pub(super) struct Use {
     pub built_here: bool,
 }
 
-/// Values that are built once for each key, with what building them cost.
-pub(super) struct Cache<K, T> {
-    /// Looked up by key only, never iterated.
-    slots: Mutex<HashMap<K, Arc<Slot<T>>>>,
-}
-
+/// A substrate that is built once, with the cost of that.
 type Slot<T> = OnceLock<(Result<T, ShapeError>, Cost)>;
-
-impl<K, T> Default for Cache<K, T> {
-    fn default() -> Self {
-        Self { slots: Mutex::default() }
-    }
-}
-
-impl<K: Eq + Hash, T: Clone> Cache<K, T> {
-    /// The value for a key, if it is built.
-    fn known(&self, key: &K) -> Option<Result<T, ShapeError>> {
-        let slots = self.slots.lock().expect("no panic while held");
-        slots.get(key)?.get().map(|(value, _)| value.clone())
-    }
-
-    /// The value for a key; a second asker waits for the first. `is_of_asker`: what building needs of
-    /// the heap is part of the work that requests it.
-    pub fn get(
-        &self,
-        key: K,
-        is_of_asker: bool,
-        build: impl FnOnce() -> Result<T, ShapeError>,
-    ) -> (Result<T, ShapeError>, Use) {
-        let slot =
-            Arc::clone(self.slots.lock().expect("no panic while held").entry(key).or_default());
-        let mut built_here = false;
-        let (value, cost) = slot
-            .get_or_init(|| {
-                built_here = true;
-                if is_of_asker { Cost::of(build) } else { Cost::of_substrate(build) }
-            })
-            .clone();
-        (value, Use { cost, built_here })
-    }
-}
 
 // The substrates of a shape, each built once, on demand.
 
@@ -483,7 +433,7 @@ impl Shape {
             Sampling::Conforming { .. } => self.triangulated().ok(),
             _ => None,
         };
-        let built = of_samples.samples.get(options.sampling, of_samples.is_of_asker, || {
+        let build = || {
             Ok(match triangulated.as_deref() {
                 Some(Triangulated { delaunay, .. }) => {
                     let all = 0..delaunay.point_count() as u32;
@@ -491,25 +441,33 @@ impl Shape {
                 }
                 None => sample(mesh, &options.sampling).into(),
             })
-        });
-        self.take(Substrate::Samples, built).expect("sampling cannot fail")
+        };
+        let samples = self.built(Substrate::Samples, &of_samples.samples, build);
+        samples.expect("sampling cannot fail")
     }
 
-    /// A substrate of the shape's own sampling.
+    /// The substrate of a slot, built now if it is not yet there; a second thread waits for the first.
     fn built<T: Clone>(
         &self,
-        cache: impl FnOnce(&OfSamples) -> &Cache<Sampling, T>,
+        substrate: Substrate,
+        slot: &Slot<T>,
         build: impl FnOnce() -> Result<T, ShapeError>,
-    ) -> (Result<T, ShapeError>, Use) {
-        let Store { of_samples, options, .. } = &*self.store;
-        cache(of_samples).get(options.sampling, of_samples.is_of_asker, build)
+    ) -> Result<T, ShapeError> {
+        let is_of_surface = matches!(substrate, Substrate::SurfaceTree | Substrate::InsideTest);
+        let is_of_asker = self.store.of_samples.is_of_asker && !is_of_surface;
+        let mut built_here = false;
+        let (value, cost) = slot.get_or_init(|| {
+            built_here = true;
+            if is_of_asker { Cost::of(build) } else { Cost::of_substrate(build) }
+        });
+        self.note(substrate, Use { cost: *cost, built_here });
+        value.clone()
     }
 
     /// Why [`Sampling::Conforming`] could not be had, once the samples are triangulated.
     pub fn sampling_warning(&self) -> Option<String> {
-        let Store { of_samples, options, .. } = &*self.store;
-        let known = of_samples.delaunay.known(&options.sampling)?;
-        known.ok()?.is_inside.as_ref().err()?.clone()
+        let (triangulated, _) = self.store.of_samples.delaunay.get()?;
+        triangulated.as_ref().ok()?.is_inside.as_ref().err()?.clone()
     }
 
     fn triangulated(&self) -> Result<Arc<Triangulated>, ShapeError> {
@@ -518,17 +476,13 @@ impl Shape {
             Sampling::Conforming { least } => (least, None),
             _ => (0, Some(self.samples())),
         };
-        let built = self.built(
-            |of_samples| &of_samples.delaunay,
-            || {
-                let triangulated = match &samples {
-                    None => Triangulated::conforming(mesh, report, least),
-                    Some(samples) => Triangulated::plain(samples),
-                };
-                Ok(Arc::new(triangulated?))
-            },
-        );
-        self.take(Substrate::Delaunay, built)
+        self.built(Substrate::Delaunay, &self.store.of_samples.delaunay, || {
+            let triangulated = match &samples {
+                None => Triangulated::conforming(mesh, report, least),
+                Some(samples) => Triangulated::plain(samples),
+            };
+            Ok(Arc::new(triangulated?))
+        })
     }
 
     /// The Delaunay triangulation of the boundary samples.
@@ -548,17 +502,13 @@ impl Shape {
         let triangulated = self.triangulated()?;
         let tree = self.surface_tree()?;
         let inside = self.inside_test();
-        let built = self.built(
-            |of_samples| &of_samples.cells,
-            || {
-                let Triangulated { delaunay, is_inside } = &*triangulated;
-                Ok(Arc::new(match is_inside {
-                    Ok(known) => CellSpheres::of_cells(delaunay, known.clone(), &inside, &tree),
-                    Err(_) => CellSpheres::classify(delaunay, &inside, &tree),
-                }))
-            },
-        );
-        self.take(Substrate::Inside, built)
+        self.built(Substrate::Inside, &self.store.of_samples.cells, || {
+            let Triangulated { delaunay, is_inside } = &*triangulated;
+            Ok(Arc::new(match is_inside {
+                Ok(known) => CellSpheres::of_cells(delaunay, known.clone(), &inside, &tree),
+                Err(_) => CellSpheres::classify(delaunay, &inside, &tree),
+            }))
+        })
     }
 
     /// As [`Shape::cells`], but by the place of the circumcentres alone, as poles need it.
@@ -572,11 +522,9 @@ impl Shape {
         }
         let tree = self.surface_tree()?;
         let inside = self.inside_test();
-        let built = self.built(
-            |of_samples| &of_samples.centred,
-            || Ok(Arc::new(CellSpheres::classify(&triangulated.delaunay, &inside, &tree))),
-        );
-        self.take(Substrate::Inside, built)
+        self.built(Substrate::Inside, &self.store.of_samples.centred, || {
+            Ok(Arc::new(CellSpheres::classify(&triangulated.delaunay, &inside, &tree)))
+        })
     }
 
     /// The Voronoi facets all of whose vertices are inside.
@@ -586,11 +534,9 @@ impl Shape {
     pub fn facets(&self) -> Result<Arc<VoronoiFacets>, ShapeError> {
         let delaunay = self.delaunay()?;
         let cells = self.cells()?;
-        let built = self.built(
-            |of_samples| &of_samples.facets,
-            || Ok(Arc::new(VoronoiFacets::new(&delaunay, &cells))),
-        );
-        self.take(Substrate::Facets, built)
+        self.built(Substrate::Facets, &self.store.of_samples.facets, || {
+            Ok(Arc::new(VoronoiFacets::new(&delaunay, &cells)))
+        })
     }
 
     /// The Voronoi medial mesh, in normalised units, with contact points.
@@ -601,18 +547,14 @@ impl Shape {
         let delaunay = self.delaunay()?;
         let cells = self.cells()?;
         let facets = self.facets()?;
-        let built = self.built(
-            |of_samples| &of_samples.medial,
-            || {
-                let (samples, dual) = (self.samples(), self.store.options.dual);
-                let mesh = voronoi_medial_mesh(&delaunay, &cells, &facets, &samples, dual);
-                if mesh.spheres.is_empty() {
-                    return Err(ShapeError::of_nothing_inside(&cells));
-                }
-                Ok(Arc::new(mesh))
-            },
-        );
-        self.take(Substrate::MedialMesh, built)
+        self.built(Substrate::MedialMesh, &self.store.of_samples.medial, || {
+            let (samples, dual) = (self.samples(), self.store.options.dual);
+            let mesh = voronoi_medial_mesh(&delaunay, &cells, &facets, &samples, dual);
+            if mesh.spheres.is_empty() {
+                return Err(ShapeError::of_nothing_inside(&cells));
+            }
+            Ok(Arc::new(mesh))
+        })
     }
 
     /// The balls whose union approximates the shape, in normalised units: the spheres of the given
@@ -627,17 +569,13 @@ impl Shape {
         }
         let delaunay = self.delaunay()?;
         let cells = self.centred()?;
-        let built = self.built(
-            |of_samples| &of_samples.balls,
-            || {
-                let balls = InnerBalls::of_poles(&delaunay, &cells, &self.samples());
-                if balls.spheres.is_empty() {
-                    return Err(ShapeError::of_nothing_inside(&cells));
-                }
-                Ok(Arc::new(balls))
-            },
-        );
-        self.take(Substrate::Poles, built)
+        self.built(Substrate::Poles, &self.store.of_samples.balls, || {
+            let balls = InnerBalls::of_poles(&delaunay, &cells, &self.samples());
+            if balls.spheres.is_empty() {
+                return Err(ShapeError::of_nothing_inside(&cells));
+            }
+            Ok(Arc::new(balls))
+        })
     }
 
     /// The medial mesh that every simplifier of this shape starts from, in normalised units: the
@@ -688,15 +626,16 @@ impl Shape {
     /// When the surface has no face.
     pub fn surface_tree(&self) -> Result<Arc<TriangleBvh>, ShapeError> {
         let Store { mesh, of_surface, .. } = &*self.store;
-        let built = of_surface.tree.get((), false, || Ok(Arc::new(TriangleBvh::new(mesh)?)));
-        self.take(Substrate::SurfaceTree, built)
+        let build = || Ok(Arc::new(TriangleBvh::new(mesh)?));
+        self.built(Substrate::SurfaceTree, &of_surface.tree, build)
     }
 
     /// The inside test of the surface.
     pub fn inside_test(&self) -> Arc<InsideTest> {
         let Store { mesh, of_surface, .. } = &*self.store;
-        let built = of_surface.inside.get((), false, || Ok(Arc::new(InsideTest::new(mesh))));
-        self.take(Substrate::InsideTest, built).expect("a test of any mesh can be built")
+        let build = || Ok(Arc::new(InsideTest::new(mesh)));
+        let test = self.built(Substrate::InsideTest, &of_surface.inside, build);
+        test.expect("a test of any mesh can be built")
     }
 
     /// A judge of medial meshes of this shape. `axis` is its exactly known medial axis, in input
@@ -712,7 +651,7 @@ impl Shape {
         let normal = self.store.normalisation;
         let truth = Truth {
             betti: self.expected_betti(),
-            axis: axis.map(|a| a.transformed(1.0 / normal.diagonal, |p| normal.forward(p))),
+            axis: axis.map(|axis| axis.to_normal(&normal)),
             diagonal: normal.diagonal,
         };
         let unseen = self.view();
