@@ -1,6 +1,5 @@
 //! Writing a report: tables, plots and the page into one folder.
 
-use std::fmt::Display;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};

@@ -26,8 +26,8 @@ use crate::parser_message;
 /// The values of one row that matter here, each 0 where the header does not declare it.
 #[derive(Default)]
 pub(crate) struct Row {
-    /// `x`, `y`, `z` and `radius` (or `r`).
-    pub numbers: [f64; 4],
+    /// `x`, `y`, `z`, `radius` and `r`.
+    pub numbers: [f64; 5],
     /// `vertex1` and `vertex2` of an edge.
     pub ends: [f64; 2],
     /// `vertex_indices` (or `vertex_index`) of a face.
@@ -52,7 +52,8 @@ impl PropertyAccess for Row {
             "x" => &mut self.numbers[0],
             "y" => &mut self.numbers[1],
             "z" => &mut self.numbers[2],
-            "radius" | "r" => &mut self.numbers[3],
+            "radius" => &mut self.numbers[3],
+            "r" => &mut self.numbers[4],
             "vertex1" => &mut self.ends[0],
             "vertex2" => &mut self.ends[1],
             _ => return PropertyAccessResult::Ignored,

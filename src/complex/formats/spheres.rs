@@ -28,7 +28,7 @@ use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, SeqAccess, Vis
 use serde_json::{Map, Value};
 use serde_saphyr::{MessageFormatter, NonFiniteFloatPolicy, UserMessageFormatter};
 
-use super::ma::{canonical, finite, lines, note, parse_ma};
+use super::ma::{comment_above, canonical, finite, lines, note, parse_ma};
 use super::{LoadedMa, MaError, MaErrorKind, ReadOptions, extension};
 use crate::complex::{MedialMesh, Sphere};
 use crate::{Vec3, parser_message, quoted, shortened};
@@ -203,20 +203,17 @@ pub(super) fn parse_rows(bytes: &[u8], name: &str, options: ReadOptions) -> Load
         let fields = fields(&line.text, separator);
         let is_header = k == 0 && fields.iter().all(|field| field.parse::<f64>().is_err());
         if is_header {
-            let names: Vec<String> =
-                fields.iter().map(|field| field.trim_matches('"').to_ascii_lowercase()).collect();
-            let place = |known: &[&str]| names.iter().position(|name| known.contains(&&**name));
-            for (column, known) in columns.iter_mut().zip(COLUMNS) {
-                *column = place(known).ok_or_else(|| {
-                    let found = quoted(&line.text);
-                    line.malformed(format!(
-                        "no column {} (found {found}, expected x,y,z,r)",
-                        known[0]
-                    ))
-                })?;
-            }
+            columns = columns_of(&fields).map_err(|why| line.malformed(why))?;
             width = fields.len();
             continue;
+        }
+        if k == 0 && let Some(comment) = comment_above(bytes) {
+            let names = self::fields(&comment, separator_of(&comment));
+            // Other comments are prose.
+            if names.len() == fields.len() && names.iter().any(|name| is_column(name, "x")) {
+                columns = columns_of(&names).map_err(|why| line.malformed(why))?;
+                width = fields.len();
+            }
         }
         if fields.len() != width {
             let found = quoted(&line.text);
@@ -227,7 +224,7 @@ pub(super) fn parse_rows(bytes: &[u8], name: &str, options: ReadOptions) -> Load
         }
         let mut numbers = [0.0; 4];
         for ((number, column), known) in numbers.iter_mut().zip(columns).zip(COLUMNS) {
-            *number = finite(fields[column], known[0]).map_err(|why| {
+            *number = finite(fields[column], known).map_err(|why| {
                 let is_comma = fields[column].contains(',');
                 line.malformed(why + if is_comma { "; write a decimal point" } else { "" })
             })?;
@@ -238,8 +235,40 @@ pub(super) fn parse_rows(bytes: &[u8], name: &str, options: ReadOptions) -> Load
     chosen(vec![link], name, options)
 }
 
-/// Names of the columns in a header.
-const COLUMNS: [&[&str]; 4] = [&["x"], &["y"], &["z"], &["r", "radius"]];
+/// Names of the columns in messages.
+const COLUMNS: [&str; 4] = ["x", "y", "z", "r"];
+
+fn is_column(field: &str, name: &str) -> bool {
+    field.trim_matches('"').eq_ignore_ascii_case(name)
+}
+
+/// The places of `x`, `y`, `z` and the radius among the names of a header.
+fn columns_of(names: &[&str]) -> Result<[usize; 4], String> {
+    let found = || quoted(&names.join(","));
+    let place = |column: &str| {
+        let mut places = (0..names.len()).filter(|&k| is_column(names[k], column));
+        match (places.next(), places.next()) {
+            (Some(_), Some(_)) => Err(format!("two columns {column} (found {})", found())),
+            (place, _) => Ok(place),
+        }
+    };
+    // With green and blue, `r` is red.
+    let has_colour = place("g")?.is_some() && place("b")?.is_some();
+    let radius = match (place("radius")?, if has_colour { None } else { place("r")? }) {
+        (Some(_), Some(_)) => {
+            return Err(format!("two columns of radii, r and radius (found {})", found()));
+        }
+        (radius, r) => radius.or(r),
+    };
+    let mut columns = [0; 4];
+    for ((column, name), place) in
+        columns.iter_mut().zip(COLUMNS).zip([place("x")?, place("y")?, place("z")?, radius])
+    {
+        let missing = || format!("no column {name} (found {}, expected x,y,z,r)", found());
+        *column = place.ok_or_else(missing)?;
+    }
+    Ok(columns)
+}
 
 /// The separator of a list by its first line: semicolons before commas, which can be decimal. `None` for blanks.
 fn separator_of(line: &str) -> Option<char> {
@@ -369,25 +398,39 @@ fn from_document(document: &Value, name: &str, options: ReadOptions) -> Loaded {
 /// Adds the lists of spheres in `value`, whose key is `key`. The readers bound the depth of `value`.
 fn collect(value: &Value, key: &str, links: &mut Vec<Link>) -> Result<(), String> {
     match value {
-        Value::Array(items) if items.iter().any(|item| centre(item).is_some()) => {
-            let mut link = Link { name: key.to_owned(), ..Link::default() };
-            for (k, item) in items.iter().enumerate() {
-                let sphere = sphere(item);
-                link.spheres.push(
-                    sphere.map_err(|why| format!("{}, sphere {}: {why}", shortened(key), k + 1))?,
-                );
-            }
-            links.push(link);
-            Ok(())
+        Value::Array(items) if items.iter().any(has_centre) => {
+            let spheres = items.iter().enumerate().map(|(k, item)| {
+                sphere(item).map_err(|why| format!("{}, sphere {}: {why}", shortened(key), k + 1))
+            });
+            let spheres = spheres.collect::<Result<_, _>>()?;
+            links.push(Link { name: key.to_owned(), spheres, ..Link::default() });
+            // Spheres of a hierarchy have others inside.
+            let inner = items.iter().filter_map(Value::as_object).flatten();
+            inner.clone().try_for_each(|(key, value)| collect(value, key, links))
         }
         Value::Array(items) => items.iter().try_for_each(|item| collect(item, key, links)),
-        Value::Object(map) => map.iter().try_for_each(|(key, value)| collect(value, key, links)),
+        Value::Object(map) => {
+            let is_named = |(_, value): &(&String, &Value)| {
+                has_centre(value) && value.get("radius").is_some()
+            };
+            let named = map.iter().filter(is_named).map(|(name, item)| {
+                sphere(item).map_err(|why| format!("{}: {why}", shortened(name)))
+            });
+            let spheres: Vec<Sphere> = named.collect::<Result<_, _>>()?;
+            if !spheres.is_empty() {
+                links.push(Link { name: key.to_owned(), spheres, ..Link::default() });
+            }
+            map.iter().try_for_each(|(key, value)| collect(value, key, links))
+        }
         _ => Ok(()),
     }
 }
 
-fn centre(item: &Value) -> Option<&Value> {
-    ["center", "origin", "centre"].iter().find_map(|key| item.get(key))
+/// Names of a centre.
+const CENTRES: [&str; 3] = ["center", "origin", "centre"];
+
+fn has_centre(item: &Value) -> bool {
+    CENTRES.iter().any(|key| item.get(key).is_some())
 }
 
 fn sphere(item: &Value) -> Result<Sphere, String> {
@@ -395,7 +438,11 @@ fn sphere(item: &Value) -> Result<Sphere, String> {
         let number = value.as_f64().filter(|number| number.is_finite());
         number.ok_or_else(|| format!("the {field} {} is not a finite number", text(value)))
     };
-    let centre = centre(item).ok_or("the center is missing")?;
+    let mut centres = CENTRES.iter().filter_map(|key| item.get(key));
+    let centre = centres.next().ok_or("the center is missing")?;
+    if centres.next().is_some() {
+        return Err("two centers".to_owned());
+    }
     let Some([x, y, z]) = centre.as_array().map(Vec::as_slice) else {
         return Err(format!("the center {} is not a list of three numbers", text(centre)));
     };
@@ -424,6 +471,14 @@ pub(super) fn parse_xml(bytes: &[u8], name: &str, options: ReadOptions) -> Loade
             return Err(malformed(name, None, why));
         }
     };
+    // Positions in a frame are relative to it, and the others stand for elements that are not in the file.
+    let unread = document.descendants().find(|node| UNREAD.contains(&node.tag_name().name()));
+    if let Some(node) = unread.filter(|_| shape == "geom") {
+        let row = document.text_pos_at(node.range().start).row as usize;
+        let tag = node.tag_name().name();
+        let why = format!("the element {tag} is not read; let MuJoCo resolve it by mj_saveLastXML");
+        return Err(malformed(name, Some(row), why));
+    }
     let classes = default_classes(&document);
     // Class of the shapes in each owner; owners of others come first.
     let mut class_of = HashMap::new();
@@ -440,16 +495,18 @@ pub(super) fn parse_xml(bytes: &[u8], name: &str, options: ReadOptions) -> Loade
                 "geom" => of_geom(element, element.attribute("class").unwrap_or(class), &classes),
                 _ => of_collision(element),
             };
-            let Some([centre, radius]) = attributes else {
-                link.others += 1;
-                continue;
-            };
-            let sphere = numbers(centre, radius).map_err(|why| {
-                // The search of a line reads the document from its start.
-                let row = document.text_pos_at(element.range().start).row as usize;
-                malformed(name, Some(row), why)
-            })?;
-            link.spheres.push(sphere);
+            let sphere = attributes.and_then(|found| {
+                found.map(|[centre, radius]| numbers(centre, radius, shape == "geom")).transpose()
+            });
+            match sphere {
+                Ok(Some(sphere)) => link.spheres.push(sphere),
+                Ok(None) => link.others += 1,
+                Err(why) => {
+                    // The search of a line reads the document from its start.
+                    let row = document.text_pos_at(element.range().start).row as usize;
+                    return Err(malformed(name, Some(row), why));
+                }
+            }
         }
         links.push(link);
     }
@@ -460,12 +517,26 @@ fn child<'a, 'i>(parent: Node<'a, 'i>, tag: &str) -> Option<Node<'a, 'i>> {
     parent.children().find(|node| node.has_tag_name(tag))
 }
 
-/// The centre and the radius of a `collision` element; `None` for another shape.
-fn of_collision<'a>(element: Node<'a, '_>) -> Option<[&'a str; 2]> {
-    let sphere = child(child(element, "geometry")?, "sphere")?;
+/// Elements of MJCF that are not read.
+const UNREAD: [&str; 4] = ["frame", "replicate", "include", "attach"];
+
+/// Text of the centre and of the radius; `None` for another shape.
+type Attributes<'a> = Result<Option<[&'a str; 2]>, String>;
+
+/// The attributes of a `collision` element.
+fn of_collision<'a>(element: Node<'a, '_>) -> Attributes<'a> {
+    let shapes = element.children().filter(|node| node.has_tag_name("geometry"));
+    let mut shapes = shapes.flat_map(|geometry| geometry.children()).filter(Node::is_element);
+    let shape = shapes.next();
+    if shapes.next().is_some() {
+        return Err("several shapes in one collision element; give one to each".to_owned());
+    }
     let origin = child(element, "origin").and_then(|origin| origin.attribute("xyz"));
     // Without a position, a shape is at the origin of its link.
-    Some([origin.unwrap_or("0 0 0"), sphere.attribute("radius").unwrap_or_default()])
+    let sphere = shape.filter(|shape| shape.has_tag_name("sphere"));
+    Ok(sphere.map(|sphere| {
+        [origin.unwrap_or("0 0 0"), sphere.attribute("radius").unwrap_or_default()]
+    }))
 }
 
 /// Attributes of a `geom`, its own or of its default class.
@@ -498,27 +569,38 @@ fn default_classes<'a>(document: &'a Document<'_>) -> HashMap<&'a str, Geom<'a>>
     classes
 }
 
-/// The centre and the radius of a `geom` element; `None` for another shape.
+/// The attributes of a `geom` element.
 fn of_geom<'a>(
     element: Node<'a, '_>,
     class: &str,
     classes: &HashMap<&str, Geom<'a>>,
-) -> Option<[&'a str; 2]> {
-    let defaults = classes.get(class).or(classes.get(MAIN)).copied().unwrap_or_default();
+) -> Attributes<'a> {
+    let defaults = match classes.get(class) {
+        Some(defaults) => *defaults,
+        // The outermost class has this name where the file gives it none.
+        None if [MAIN, "main"].contains(&class) => {
+            classes.get(MAIN).copied().unwrap_or_default()
+        }
+        None => return Err(format!("unknown class {}", quoted(class))),
+    };
     let [kind, mesh, ends, centre, radius] = with_defaults(element, defaults);
     // MuJoCo fits a sphere to the mesh, which this reader does not have. Ends belong to capsules and boxes.
     let is_sphere = kind.unwrap_or("sphere") == "sphere" && mesh.is_none() && ends.is_none();
-    is_sphere.then(|| [centre.unwrap_or("0 0 0"), radius.unwrap_or_default()])
+    Ok(is_sphere.then(|| [centre.unwrap_or("0 0 0"), radius.unwrap_or_default()]))
 }
 
-fn numbers(centre: &str, radius: &str) -> Result<Sphere, String> {
+/// A sphere from its attributes. MJCF allows three sizes, of which a sphere uses the first.
+fn numbers(centre: &str, radius: &str, allows_sizes: bool) -> Result<Sphere, String> {
     let [x, y, z] = *centre.split_ascii_whitespace().collect::<Vec<_>>() else {
         return Err(format!("the position {} is not three numbers", quoted(centre)));
     };
     let centre = Vec3::new(finite(x, "x")?, finite(y, "y")?, finite(z, "z")?);
-    // MJCF allows three sizes, of which a sphere uses the first.
-    let radius = radius.split_ascii_whitespace().next().ok_or("the radius is missing")?;
-    Ok(Sphere::new(centre, finite(radius, "radius")?))
+    let mut sizes = radius.split_ascii_whitespace();
+    let size = sizes.next().ok_or("the radius is missing")?;
+    if sizes.next().is_some() && !allows_sizes {
+        return Err(format!("the radius {} is not one number", quoted(radius)));
+    }
+    Ok(Sphere::new(centre, finite(size, "radius")?))
 }
 
 #[cfg(test)]
@@ -594,6 +676,10 @@ mod tests {
             ("x.urdf", &format!("\u{feff}{urdf}"), &[2.0]),
             ("x.csv", "x;y;z;r;note\n1;2;3;4;a, b\n", &[4.0]),
             ("x.csv", "Z,radius,id,y,X\n1,2,7,3,4\n", &[2.0]),
+            ("x.csv", "x,y,z,r,g,b,radius\n0,0,0,255,1,1,4\n", &[4.0]),
+            ("x.csv", "# radius,x,y,z\n1,10,20,30\n", &[1.0]),
+            ("x.csv", "# by a tool\n0,0,0,2\n", &[2.0]),
+            ("x.json", "{\"tip\": {\"center\": [0, 0, 0], \"radius\": 2}, \"n\": 3}", &[2.0]),
             ("x.csv", "0, 0, 0, 1\r\n0, 0, 1, 2\r\n", &[1.0, 2.0]),
             ("x.csv", "\u{feff}\"x\";\"y\";\"z\";\"r\"\n0;0;0;1\n", &[1.0]),
             ("x.txt", "# clump\n0 0 0 1\n0 0 1 2\n", &[1.0, 2.0]),
@@ -697,7 +783,13 @@ x.csv => x;y;z;r\n1 500;2;3;4\n => , line 2: the x "1 500" is not
 x.txt => x y z r\n1,5 2,5 3,5 1,25\n => , line 1: expected three counts
 x.xyzr => 0 0 0 1\n0 0 0 1\n1 000 0 0 1\n => , line 3: 5 fields instead of 4
 x.xyzr => 0 0 0 1\n0 0 1 inf\n => , line 2: the r "inf" is not
+x.csv => x,y,z,r,g,b\n0,0,0,255,1,1\n => , line 1: no column r (found "x,y,z,r,g,b"
+x.csv => x,y,z,r,radius\n0,0,0,5,1\n => , line 1: two columns of radii, r and radius
+x.csv => x,y,z,r,x\n0,0,0,5,1\n => , line 1: two columns x (found
+x.csv => # x,y,z,diameter\n0,0,0,5\n => , line 2: no column r (found "x,y,z,diameter"
 x.json =>  => , line 1: EOF
+x.json => [{"center": [0, 0, 0], "radius": 1, "children": [{"center": [0, 0, 0], "radius": 1}]}] => : 2 links (
+x.json => [{"center": [0, 0, 0], "origin": [1, 0, 0], "radius": 1}] => : , sphere 1: two centers
 x.json => {\n] => , line 2:
 x.json => {"a": []} => : no spheres
 x.json => 3 => : no spheres
@@ -716,6 +808,11 @@ x.yaml => ~: 1\n => , line 1: null is not allowed here
 x.yaml => collision_spheres: spheres/franka.yml\n => : no spheres
 x.yaml => a:\n  - {center: [0, 0, 0], radius: -1}\n => : no spheres (found 1 with a negative radius)
 x.urdf => <robot>\n<link>\n</robot> => , line 3:
+x.urdf => <robot><link><collision><geometry><sphere radius='1'/><sphere radius='2'/></geometry></collision></link></robot> => , line 1: several shapes
+x.urdf => <robot><link><collision><geometry><sphere radius='0 5'/></geometry></collision></link></robot> => , line 1: the radius "0 5" is not one number
+x.xml => <mujoco><worldbody>\n<frame pos='1 0 0'><geom size='1'/></frame></worldbody></mujoco> => , line 2: the element frame is not read; let
+x.xml => <mujoco><include file='a.xml'/><worldbody><geom size='1'/></worldbody></mujoco> => , line 1: the element include is not read
+x.xml => <mujoco><worldbody><geom class='none' size='1'/></worldbody></mujoco> => , line 1: unknown class "none"
 x.urdf => <sdf/> => : unknown root element (found "sdf", expected robot or mujoco)
 x.urdf => <!DOCTYPE r [<!ENTITY a 'b'>]><robot/> => , line 1:
 x.urdf => <robot>\n<link><collision><geometry><sphere/></geometry></collision></link></robot> => , line 2: the radius is missing

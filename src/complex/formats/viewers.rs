@@ -126,7 +126,8 @@ fn read_ply(bytes: &[u8], options: ReadOptions) -> Result<LoadedMa, MaErrorKind>
         ("vertex", &["x"]),
         ("vertex", &["y"]),
         ("vertex", &["z"]),
-        ("vertex", &["radius", "r"]),
+        // With `g`, it is red.
+        ("vertex", if file.has("vertex", &["g"]) { &["radius"] } else { &["radius", "r"] }),
         ("edge", &["vertex1"]),
         ("edge", &["vertex2"]),
         ("face", &["vertex_indices", "vertex_index"]),
@@ -144,6 +145,7 @@ fn read_ply(bytes: &[u8], options: ReadOptions) -> Result<LoadedMa, MaErrorKind>
         }
     }
     let vertices = file.count("vertex");
+    let has_radius = file.has("vertex", &["radius", "g"]);
     let (mut spheres, mut edges, mut faces) = (Vec::new(), Vec::new(), Vec::new());
     file.rows(|element, vertex, at, values| -> Result<(), MaErrorKind> {
         match (element, values.corners.as_slice()) {
@@ -151,7 +153,8 @@ fn read_ply(bytes: &[u8], options: ReadOptions) -> Result<LoadedMa, MaErrorKind>
                 if let Some(&value) = values.numbers.iter().find(|number| !number.is_finite()) {
                     return Err(Fault::Coordinate { at: at.clone(), vertex, value }.into());
                 }
-                let [x, y, z, radius] = values.numbers;
+                let [x, y, z, radius, r] = values.numbers;
+                let radius = if has_radius { radius } else { r };
                 spheres.push(Sphere::new(Vec3::new(x, y, z), radius));
             }
             ("edge", _) => edges.push(indices(values.ends, vertices, at)?),
