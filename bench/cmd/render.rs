@@ -107,9 +107,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         max_error: arguments.max_error,
         tolerance: arguments.tolerance,
     };
-    let failed = |error: DrawError| match error.is_option() {
-        true => Failure::usage(format!("--{error}")),
-        false => Failure::input(error),
+    let failed = |error: DrawError| match &error {
+        DrawError::Reconstruction { .. } if error.is_option() => Failure::usage(error),
+        _ if error.is_option() => Failure::usage(format!("--{error}")),
+        _ => Failure::input(error),
     };
     drawing.content(arguments.axes.len()).map_err(failed)?;
     let line = StageLine::new(global.stages());
@@ -149,7 +150,7 @@ fn size(text: &str) -> Result<[usize; 2], &'static str> {
 
 #[cfg(test)]
 mod tests {
-    use super::size;
+    use super::*;
 
     #[test]
     fn sizes_are_parsed_or_refused() {
