@@ -35,9 +35,7 @@ pub fn hashes(root: &Path) -> BTreeMap<String, String> {
     let modules: Vec<&str> =
         list.lines().filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';')).collect();
     let mut files: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
-    for file in
-        sources(root, &["tests", "benches", "examples", "build.rs", "lib.rs"])
-    {
+    for file in sources(root, &["tests", "benches", "examples", "build.rs", "lib.rs"]) {
         let first = file.strip_prefix(root).ok().and_then(|path| path.iter().next());
         let first = first.unwrap_or_default().to_string_lossy();
         let module = first.trim_end_matches(".rs");

@@ -11,11 +11,11 @@ use medial_run::text::{escape_html, file_stems, grouped};
 
 use crate::comparison::{Comparison, Entry, reached};
 use crate::differences::against_others;
+use crate::error::ReportError;
 use crate::header::{Header, MethodNote, method_pages};
 use crate::metric::{HAUSDORFF, MEAN_ERROR, MIN_ANGLE, TOTAL_SECONDS};
 use crate::pictures::strips;
 use crate::tables::{Cell, Table, mesh_table, to_html, topology_word};
-use crate::error::ReportError;
 use crate::write::{Files, write_report};
 
 /// Writes the site of some records into a folder: the report without medial meshes, and further pages. Pictures and 3D views

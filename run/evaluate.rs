@@ -26,8 +26,7 @@ impl Evaluator<'_> {
     /// When the medial mesh has no union, or the certificate is too narrow.
     pub fn evaluate(&self, mesh: &MedialMesh) -> Result<Evaluation, MetricError> {
         let units = self.shape.normalisation();
-        let normal =
-            |mesh: &MedialMesh| mesh.to_normal(units);
+        let normal = |mesh: &MedialMesh| mesh.to_normal(units);
         let mesh = normal(mesh);
         let mesh = if self.spheres_alone { mesh.spheres_alone() } else { mesh };
         let mut evaluation = self.judge.evaluate_certified(&mesh, self.certify)?;

@@ -79,8 +79,7 @@ pub fn render<'py>(
         monitor.at("reading");
         let shape = model.shape(&ShapeOptions::default())?;
         let units = *shape.normalisation();
-        let normal =
-            |mesh: &MedialMesh| mesh.to_normal(&units);
+        let normal = |mesh: &MedialMesh| mesh.to_normal(&units);
         let axes: Vec<_> = axes.into_iter().map(|(name, mesh)| (name, normal(&mesh))).collect();
         let drawn = drawing.draw(&shape, &axes, &|stage| monitor.at(stage));
         let drawn = drawn.map_err(|error: DrawError| {

@@ -27,6 +27,7 @@
 //!   primitives touch count more than once in `reverse_mean`.
 
 use super::ascent::{OnMesh, OnUnion, Peak, SEEDS, Start, ascend};
+use super::bounds::ROUNDING;
 use super::depth::Boundary;
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::error::MetricError;
@@ -174,7 +175,7 @@ pub(super) fn highest(
 
 /// Depth, as a fraction of the surface's diameter, from which a sample of one primitive's surface
 /// counts as buried in another primitive, and not as on the union's boundary.
-pub(super) const BURIAL: f64 = 1e-7;
+pub(super) const BURIAL: f64 = ROUNDING;
 
 fn absolute(mut values: Vec<f64>) -> Vec<f64> {
     for value in &mut values {

@@ -203,8 +203,9 @@ impl Judge {
     /// # Errors
     /// As [`Judge::evaluate`], and when the tolerance is out of range or too fine.
     pub fn certify(&self, mesh: &MedialMesh, tolerance: f64) -> Result<Certificate, MetricError> {
-        let (mesh, _) = self.samples()?.ordered(mesh)?;
-        certify(&self.surface, &self.tree, &mesh, tolerance)
+        let samples = self.samples()?;
+        samples.ordered(mesh)?;
+        certify(&self.surface, &self.tree, &samples.pose.in_order(mesh), tolerance)
     }
 
     /// [`Judge::evaluate`], with the intervals of [`Judge::certify`] and [`Judge::cover`] of the width `certify`.

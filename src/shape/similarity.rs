@@ -447,12 +447,7 @@ impl Surface {
 
     /// The similarity near a start that brings the union nearest to the surface, for `source` with or without a shift:
     /// steps of one parameter, halved where none helps.
-    fn nearest(
-        &self,
-        nearness: &Nearness<'_>,
-        start: Similarity,
-        source: FitSource,
-    ) -> Similarity {
+    fn nearest(&self, nearness: &Nearness<'_>, start: Similarity, source: FitSource) -> Similarity {
         // The scale keeps the middle of the surface, or the origin of the input units.
         let fixed = match source {
             FitSource::Scaled => -self.units.origin / self.units.diagonal,

@@ -191,9 +191,17 @@ const CIRCLES: &[&[&str]] = &[
 #[test]
 fn files_do_not_use_each_other_in_a_circle() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    for crate_root in
-        ["src/geometry", "src", "methods", "datasets", "run", "reports", "bench", "python/src", "fuzz"]
-    {
+    for crate_root in [
+        "src/geometry",
+        "src",
+        "methods",
+        "datasets",
+        "run",
+        "reports",
+        "bench",
+        "python/src",
+        "fuzz",
+    ] {
         for circle in circles(&root.join(crate_root)) {
             let files: BTreeSet<_> =
                 circle.iter().map(|file| format!("{crate_root}/{file}")).collect();

@@ -79,7 +79,11 @@ fn wrong_words_are_named_and_nothing_is_written() {
         (&["--tolerance", "2"], 2, "a number above 0 and at most 1"),
         (&["--show", "error"], 2, "--show error: no medial mesh; name one"),
         (&[&axis, &axis, "--show", "reconstruction"], 2, "--show reconstruction"),
-        (&[&axis, "--show", "error", "--tolerance", "1e-7"], 2, "ball: tolerance 1.000e-7 is too fine"),
+        (
+            &[&axis, "--show", "error", "--tolerance", "1e-7"],
+            2,
+            "ball: tolerance 1.000e-7 is too fine",
+        ),
         (&["no-such.ma"], 1, "no-such.ma"),
         (&[&points, "--show", "error"], 1, "points.ma: all spheres have radius zero"),
     ];

@@ -244,7 +244,7 @@ fn any_axis_can_be_pruned() {
     assert_eq!(union.mesh, at(&shape, &[], Level::Published).mesh);
     assert_ne!(union.mesh, voronoi.mesh);
     let back = shape.normalisation();
-    let given = voronoi.mesh.to_input(&back);
+    let given = voronoi.mesh.to_input(back);
     let given = default_shape("bracket").with_initial(&given);
     for axis in ["auto", "union", "initial"] {
         let result = at(&given, &[("axis", axis)], Level::Published);

@@ -28,7 +28,7 @@ use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, SeqAccess, Vis
 use serde_json::{Map, Value};
 use serde_saphyr::{MessageFormatter, NonFiniteFloatPolicy, UserMessageFormatter};
 
-use super::ma::{comment_above, canonical, finite, lines, note, parse_ma};
+use super::ma::{canonical, comment_above, finite, lines, note, parse_ma};
 use super::{LoadedMa, MaError, MaErrorKind, ReadOptions, extension};
 use crate::complex::{MedialMesh, Sphere};
 use crate::{Vec3, parser_message, quoted, shortened};
@@ -207,7 +207,9 @@ pub(super) fn parse_rows(bytes: &[u8], name: &str, options: ReadOptions) -> Load
             width = fields.len();
             continue;
         }
-        if k == 0 && let Some(comment) = comment_above(bytes) {
+        if k == 0
+            && let Some(comment) = comment_above(bytes)
+        {
             let names = self::fields(&comment, separator_of(&comment));
             // Other comments are prose.
             if names.len() == fields.len() && names.iter().any(|name| is_column(name, "x")) {
@@ -410,9 +412,8 @@ fn collect(value: &Value, key: &str, links: &mut Vec<Link>) -> Result<(), String
         }
         Value::Array(items) => items.iter().try_for_each(|item| collect(item, key, links)),
         Value::Object(map) => {
-            let is_named = |(_, value): &(&String, &Value)| {
-                has_centre(value) && value.get("radius").is_some()
-            };
+            let is_named =
+                |(_, value): &(&String, &Value)| has_centre(value) && value.get("radius").is_some();
             let named = map.iter().filter(is_named).map(|(name, item)| {
                 sphere(item).map_err(|why| format!("{}: {why}", shortened(name)))
             });
@@ -534,9 +535,8 @@ fn of_collision<'a>(element: Node<'a, '_>) -> Attributes<'a> {
     let origin = child(element, "origin").and_then(|origin| origin.attribute("xyz"));
     // Without a position, a shape is at the origin of its link.
     let sphere = shape.filter(|shape| shape.has_tag_name("sphere"));
-    Ok(sphere.map(|sphere| {
-        [origin.unwrap_or("0 0 0"), sphere.attribute("radius").unwrap_or_default()]
-    }))
+    Ok(sphere
+        .map(|sphere| [origin.unwrap_or("0 0 0"), sphere.attribute("radius").unwrap_or_default()]))
 }
 
 /// Attributes of a `geom`, its own or of its default class.
@@ -578,9 +578,7 @@ fn of_geom<'a>(
     let defaults = match classes.get(class) {
         Some(defaults) => *defaults,
         // The outermost class has this name where the file gives it none.
-        None if [MAIN, "main"].contains(&class) => {
-            classes.get(MAIN).copied().unwrap_or_default()
-        }
+        None if [MAIN, "main"].contains(&class) => classes.get(MAIN).copied().unwrap_or_default(),
         None => return Err(format!("unknown class {}", quoted(class))),
     };
     let [kind, mesh, ends, centre, radius] = with_defaults(element, defaults);
