@@ -38,7 +38,7 @@ use medial::simplifier::{
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::ranked::{FacetSet, Published, Ranked, RankedFacets, Scale, Wanted};
+use crate::ranked::{FacetSet, Published, Ranked, Scale, Wanted};
 use crate::{Prepared, Result};
 
 medial::parameters! {
@@ -48,9 +48,6 @@ medial::parameters! {
         /// The filtered elements: Voronoi vertices, or Voronoi facets, edges and vertices, each by
         /// its own value.
         variant: Variant = Variant::Vertex, "vertex or cell";
-        /// For `cell`: keep edges and vertices that pass without a facet, parts like curves and
-        /// points, which belong to the lambda-medial axis by definition.
-        leftovers: bool = true, "true or false";
     }
 }
 
@@ -104,8 +101,7 @@ pub fn method() -> Method<LambdaParams> {
 fn prepare<'s>(shape: &'s Shape, params: LambdaParams, _run: &RunContext) -> Prepared<'s> {
     Ok(match params.variant {
         Variant::Vertex => Box::new(rank_spheres(shape)?),
-        Variant::Cell if params.leftovers => Box::new(rank_cells(shape)?),
-        Variant::Cell => Box::new(rank_facets(shape)?),
+        Variant::Cell => Box::new(rank_cells(shape)?),
     })
 }
 
@@ -145,11 +141,10 @@ fn rank_spheres(shape: &Shape) -> Result<Ranked> {
 //    interior has.
 // 2. Keep the cells with `F >= lambda`. The dual of a cell is part of the duals of its sides, so that
 //    values grow from facets to edges to vertices, and the kept part is closed.
-// 3. Facets are cut into triangles. Edges and vertices that pass without a facet stay as they are, or
-//    are left out (`leftovers=false`).
+// 3. Facets are cut into triangles. Edges and vertices that pass without a facet stay as they are.
 //
 // A number of spheres selects the vertices of largest value; of several with the same value, all or
-// none. Without leftovers it selects the facets of largest value.
+// none.
 //
 // # Deviations from the paper
 // - Rounding must not open the result: a value is at least that of the cells around it.
@@ -219,14 +214,6 @@ fn rank_cells(shape: &Shape) -> Result<Cells> {
 
 fn enclosing_radius(contacts: &Contacts, ids: &[u32]) -> f64 {
     enclosing_ball(&ids.iter().map(|&s| contacts.samples[s as usize]).collect::<Vec<_>>()).1
-}
-
-/// The facets alone.
-fn rank_facets(shape: &Shape) -> Result<RankedFacets<'static>> {
-    let set = FacetSet::of(shape)?;
-    let value = facet_values(shape, &set.facets)?;
-    let scale = scale(&set.mesh);
-    Ok(RankedFacets::new(set, value, scale, Diagnostics::default()))
 }
 
 fn facet_values(shape: &Shape, facets: &VoronoiFacets) -> Result<Vec<f64>> {

@@ -459,8 +459,6 @@ pub(crate) struct Without<'a> {
     /// Sheets left at each edge; at each sphere, with one more for edges that lie in no facet.
     at_edge: Vec<u32>,
     at_sphere: Vec<u32>,
-    /// Number of spheres left.
-    pub spheres: usize,
 }
 
 impl<'a> Without<'a> {
@@ -475,7 +473,6 @@ impl<'a> Without<'a> {
         Self {
             gone: vec![false; sheets.len()],
             at_edge: sheets.sheets_at_edge.iter().map(|sheets| sheets.len() as u32).collect(),
-            spheres: at_sphere.len(),
             at_sphere,
             sheets,
         }
@@ -503,9 +500,7 @@ impl<'a> Without<'a> {
         }
         let mut neighbours = Vec::new();
         for &v in &vertices[sheet] {
-            let left = &mut self.at_sphere[v as usize];
-            *left -= 1;
-            self.spheres -= usize::from(*left == 0);
+            self.at_sphere[v as usize] -= 1;
             let others = sheets_at_sphere[v as usize].iter().map(|&other| other as usize);
             neighbours.extend(others.filter(|&other| !self.gone[other]));
         }

@@ -16,8 +16,6 @@
 //!   between them. The default: it meets every number of spheres.
 //! - `facet`: the facets of the Voronoi diagram, with their sides and corners, as
 //!   Attali and Montanvert have it.
-//! - `grid` (file `grid.rs`): faces between voxels, Foskey et al.'s own algorithm, whose resolution
-//!   decides the number of spheres.
 //! - `homotopy`: sheets, removed only where that changes no topology (Sud et al.).
 //!
 //! # The published level
@@ -28,8 +26,6 @@
 //! # Equal angles
 //! Many angles are exactly 180 degrees. Of equal angles, spheres and sheets of larger balls are kept
 //! first; those of about equal size are kept spread over the shape (`methods/ranked.rs`).
-
-mod grid;
 
 use std::collections::BTreeSet;
 
@@ -54,18 +50,11 @@ medial::parameters! {
     /// Parameters of the angle filter.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct AngleParams {
-        /// The filtered elements: Voronoi vertices, Voronoi facets, faces between voxels, or sheets
-        /// whose removal changes no topology.
-        variant: Variant = Variant::Vertex, "vertex, facet, grid or homotopy";
-        /// For `facet`: where the angle is measured, at the mean of a facet's vertices or at the
-        /// vertex where it is smallest.
-        at: FacetAngle = FacetAngle::Barycentre, "barycentre or minimum";
-        /// For `grid`: voxels along the longest side of the bounding box, a fraction allowed.
-        resolution: f64 = 64.0, "voxels";
-        /// For `grid` and `homotopy`: meet a number of spheres by the resolution or the number of
-        /// samples at the angle `theta`, or by the angle at the given ones.
-        size: Size = Size::Sampling, "sampling or ranking";
-        /// Angle of the published level, and of a number of spheres met by the sampling.
+        /// The filtered elements: Voronoi vertices, Voronoi facets, or sheets whose removal changes no
+        /// topology.
+        variant: Variant = Variant::Vertex, "vertex, facet or homotopy";
+        /// Angle of the published level, and for `homotopy` of a number of spheres, which is met by the
+        /// number of samples.
         theta: f64 = 60.0, "degrees of separation angle";
     }
 }
@@ -78,37 +67,12 @@ pub enum Variant {
     Vertex,
     /// Voronoi facets.
     Facet,
-    /// Faces between voxels.
-    Grid,
     /// Sheets, as far as the topology stays.
     Homotopy,
 }
 
-/// How a number of spheres is met.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Size {
-    /// How finely the shape is sampled, at one angle: the resolution of the lattice for `grid`, the
-    /// number of samples for `homotopy`.
-    #[serde(alias = "resolution", alias = "density")]
-    Sampling,
-    /// The angle, at the given sampling.
-    Ranking,
-}
-
-/// Where the separation angle of a Voronoi facet is measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum FacetAngle {
-    /// At the mean of its vertices.
-    Barycentre,
-    /// At the vertex where it is smallest, hence the smallest of the facet.
-    Minimum,
-}
-
 impl AngleParams {
     fn validate(self) -> Result<Self> {
-        within("resolution", self.resolution, grid::MIN_RESOLUTION..=grid::MAX_RESOLUTION)?;
         within("theta", self.theta, 0.0..=180.0)?;
         Ok(self)
     }
@@ -148,15 +112,10 @@ pub fn method() -> Method<AngleParams> {
 fn prepare<'s>(shape: &'s Shape, params: AngleParams, run: &RunContext) -> Prepared<'s> {
     let params = params.validate()?;
     let scale = scale(params.theta);
-    Ok(match (params.variant, params.size) {
-        (Variant::Vertex, _) => Box::new(rank_spheres(shape, scale)?),
-        (Variant::Facet, _) => Box::new(rank_facets(shape, params.at, scale)?),
-        (Variant::Grid, Size::Sampling) => {
-            Box::new(grid::prepare_by_resolution(shape, params, run)?)
-        }
-        (Variant::Grid, Size::Ranking) => Box::new(grid::prepare(shape, &params, run)?),
-        (Variant::Homotopy, Size::Sampling) => Box::new(peel_by_samples(shape, params.theta, run)?),
-        (Variant::Homotopy, Size::Ranking) => Box::new(peel(shape, scale, run)?),
+    Ok(match params.variant {
+        Variant::Vertex => Box::new(rank_spheres(shape, scale)?),
+        Variant::Facet => Box::new(rank_facets(shape, scale)?),
+        Variant::Homotopy => Box::new(peel_by_samples(shape, params.theta, run)?),
     })
 }
 
@@ -170,7 +129,7 @@ fn prepare<'s>(shape: &'s Shape, params: AngleParams, run: &RunContext) -> Prepa
 //
 // # Deviations from the papers
 // - Attali and Montanvert, and Foskey et al., filter the facets of a Voronoi diagram and of a
-//   grid. This variant filters Voronoi vertices, so that it reaches any number of spheres
+//   grid of voxels, which is not here. This variant filters Voronoi vertices, so that it reaches any number of spheres
 //   like every other method.
 // - A sphere that touches the boundary at its own centre (radius zero), or in fewer than two points,
 //   has no angle; it gets `S = 0` and goes first.
@@ -196,7 +155,7 @@ fn rank_spheres(shape: &Shape, scale: Scale) -> Result<Ranked> {
 // 1. The Voronoi facets all of whose vertices are inside. Each point `x` within the facet dual to the
 //    Delaunay edge `pq` has `Pi(x) = {p, q}`, so that `S(x) = 2 arcsin(|p - q| / 2 |p - x|)`: largest
 //    at the point of the facet nearest to the middle of `pq`, smallest at a vertex.
-// 2. The value of a facet: `S` at the mean of its vertices, or the smallest `S` on it.
+// 2. The value of a facet: `S` at the mean of its vertices.
 // 3. Keep the facets with a value above `theta`, or as many of the best as a number of spheres
 //    allows, with their sides and corners.
 //
@@ -205,7 +164,7 @@ fn rank_spheres(shape: &Shape, scale: Scale) -> Result<Ranked> {
 //   measured. The scale axis tool uses the mean of the vertices for its own filter.
 
 /// Ranks the Voronoi facets. `O(n)` for their vertices.
-fn rank_facets(shape: &Shape, at: FacetAngle, scale: Scale) -> Result<RankedFacets<'static>> {
+fn rank_facets(shape: &Shape, scale: Scale) -> Result<RankedFacets<'static>> {
     let set = FacetSet::of(shape)?;
     let delaunay = shape.delaunay()?;
     let values: Vec<f64> = (0..set.facets.len())
@@ -214,13 +173,8 @@ fn rank_facets(shape: &Shape, at: FacetAngle, scale: Scale) -> Result<RankedFace
             let ends = set.facets.ends(facet).map(|v| delaunay.point(v));
             let vertices =
                 set.facets.polygon(facet).iter().map(|&s| set.mesh.spheres[s as usize].centre);
-            match at {
-                FacetAngle::Barycentre => {
-                    let mean = vertices.clone().sum::<Vec3>() / vertices.len() as f64;
-                    angle_from(mean, ends)
-                }
-                FacetAngle::Minimum => vertices.map(|x| angle_from(x, ends)).fold(180.0, f64::min),
-            }
+            let count = vertices.len() as f64;
+            angle_from(vertices.sum::<Vec3>() / count, ends)
         })
         .collect();
     Ok(RankedFacets::new(set, values, scale, Diagnostics::default()))
@@ -261,8 +215,7 @@ fn angle_from(x: Vec3, [p, q]: [Vec3; 2]) -> f64 {
 // to 179.99999, all but 6 of the 3,181 of the built-in plate. `theta` cannot reach fewer spheres than
 // theirs, and the topology test would leave one strip or lump of them. So a number of spheres is met by
 // the number of samples at one `theta` (`methods/levels.rs`); the topology is then that of the
-// Voronoi diagram of those samples. With `size=ranking` the sheets of the given samples are removed
-// further in the order of step 3, which keeps the topology, as long as one can be removed.
+// Voronoi diagram of those samples.
 //
 // # Why the topology stays
 // A facet is a disc. If its seam is connected and not the whole border, the seam is an arc or a point,
@@ -283,8 +236,6 @@ pub(super) struct Peeled {
     sheets: Sheets,
     /// Sheets in the order of their removal, with their effective values, ascending.
     removed: Vec<(u32, f64)>,
-    /// Number of spheres left after each number of removals.
-    left: Vec<usize>,
     scale: Scale,
     diagnostics: Diagnostics,
 }
@@ -316,7 +267,7 @@ fn peel(shape: &Shape, scale: Scale, run: &RunContext) -> Result<Peeled> {
         .collect();
     let sheets = Sheets::of(&set.mesh, &set.facets);
     let mut without = Without::none(&sheets);
-    let (mut removed, mut left) = (Vec::new(), vec![without.spheres]);
+    let mut removed = Vec::new();
     let order = in_order(&set, &value);
     let mut place = vec![0; order.len()];
     (0..).zip(&order).for_each(|(rank, &sheet)| place[sheet as usize] = rank);
@@ -334,13 +285,12 @@ fn peel(shape: &Shape, scale: Scale, run: &RunContext) -> Result<Peeled> {
         let neighbours = without.remove(sheet as usize);
         effective = effective.max(value[sheet as usize]);
         removed.push((sheet, effective));
-        left.push(without.spheres);
         open.extend(neighbours.into_iter().map(|sheet| place[sheet]));
     }
     let mut diagnostics = Diagnostics::default();
     diagnostics.count("sheets", sheets.len());
     diagnostics.count("sheets_that_can_go", removed.len());
-    Ok(Peeled { set, sheets, removed, left, scale, diagnostics })
+    Ok(Peeled { set, sheets, removed, scale, diagnostics })
 }
 
 /// Sheets by ascending value; of equal values the smallest first, so that the rest is spread over the thick parts.
@@ -410,29 +360,13 @@ impl Peeled {
 impl Simplification for Peeled {
     fn at(&mut self, level: Level) -> Result<Simplified> {
         let mut diagnostics = self.diagnostics.clone();
-        let (count, native) = match self.scale.wanted(level, &mut diagnostics)? {
-            Wanted::Spheres(spheres) => {
-                let enough = self.left.partition_point(|&left| left > spheres);
-                let count = enough.min(self.removed.len());
-                (count, count.checked_sub(1).map_or(0.0, |last| self.removed[last].1))
-            }
-            Wanted::Native(theta) => {
-                (self.removed.partition_point(|&(_, value)| value <= theta), theta)
-            }
+        let Wanted::Native(theta) = self.scale.wanted(level, &mut diagnostics)? else {
+            unreachable!("a number of spheres is met by the number of samples");
         };
+        let count = self.removed.partition_point(|&(_, value)| value <= theta);
         let mesh = self.mesh(count);
-        if let Level::Spheres(requested) = level
-            && mesh.spheres.len() != requested
-        {
-            let why = match mesh.spheres.len() > requested {
-                true => "no other sheet can go without a change of topology",
-                false => "whole sheets are removed",
-            };
-            diagnostics
-                .warn(format!("{} spheres instead of {requested}: {why}", mesh.spheres.len()));
-        }
         diagnostics.count("sheets_removed", count);
-        let native_level = Some(native);
+        let native_level = Some(theta);
         Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, level) })
     }
 }

@@ -44,13 +44,11 @@ use medial::shape::Shape;
 use medial::simplifier::RunContext;
 use medial::surface::{Closest, Feature, InsideTest, TriMesh, TriangleBvh, Vicinity};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use crate::Result;
 
 /// How samples lie on a sphere.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spiral {
     /// Heights `-1 + (2k - 1) / N`, in the middle of zones of equal area.
     EqualArea,

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::SampleLists;
 use super::edge::{Edge, Ground, NONE, Star};
-use super::{Blocking, HemParams, Inside};
+use super::{HemParams, Inside};
 use crate::Result;
 
 /// Collapses between two reports of progress.
@@ -22,7 +22,6 @@ const JOB: usize = 4096;
 /// A medial mesh under contraction.
 pub(super) struct Contraction {
     inside: Inside,
-    blocking: Blocking,
     /// The complex as it is now, with a record of the collapses.
     pub complex: CollapseComplex,
     /// The samples as they are assigned now.
@@ -76,7 +75,6 @@ impl Contraction {
     pub(super) fn new(mesh: &MedialMesh, samples: SampleLists, params: HemParams) -> Self {
         let mut contraction = Self {
             inside: params.inside,
-            blocking: params.blocking,
             complex: CollapseComplex::from_mesh(mesh).recording(),
             samples,
             edges: Edges::default(),
@@ -192,7 +190,7 @@ impl Contraction {
     fn bar(&mut self, ends: [u32; 2], edge: &mut Edge) {
         let [a, b] = ends;
         edge.tested = true;
-        if self.is_blocked(ends) {
+        if !self.complex.keeps_homotopy(a, b) {
             self.tally.held_by_topology += 1;
             edge.bar(0);
             edge.bar(1);
@@ -203,19 +201,6 @@ impl Contraction {
             if self.complex.folded_face(a, b, centre).is_some() {
                 self.tally.held_by_inversion += 1;
                 edge.bar(survivor);
-            }
-        }
-    }
-
-    /// Whether the topology forbids the collapse of an edge.
-    fn is_blocked(&mut self, [a, b]: [u32; 2]) -> bool {
-        match self.blocking {
-            Blocking::Homotopy => !self.complex.keeps_homotopy(a, b),
-            Blocking::Neighbours => {
-                let of_b = self.complex.neighbours(b);
-                let common = self.complex.neighbours(a).iter().filter(|v| of_b.contains(v));
-                let sides = self.complex.opposite_sides(a).iter();
-                common.count() > sides.filter(|side| side.contains(&b)).count()
             }
         }
     }
@@ -307,7 +292,8 @@ impl Contraction {
         if edges.is_empty() {
             return "no edge is left, each sphere is a separate component".to_owned();
         }
-        let by_topology = edges.iter().filter(|&&ends| self.is_blocked(ends)).count();
+        let by_topology =
+            edges.iter().filter(|&&[a, b]| !self.complex.keeps_homotopy(a, b)).count();
         let by_inversion = edges.len() - by_topology;
         format!(
             "the link condition holds back {by_topology} of the {} edges left, to keep the topology, \

@@ -55,11 +55,7 @@ fn model((spheres, edges, faces, points, lists, coarse): Parts, inside: Inside) 
 }
 
 fn contraction(model: &Model) -> Contraction {
-    Contraction::new(
-        &model.mesh(),
-        model.sample_lists(),
-        HemParams { inside: model.inside, ..HemParams::default() },
-    )
+    Contraction::new(&model.mesh(), model.sample_lists(), HemParams { inside: model.inside })
 }
 
 /// Every edge of a complex with its own evaluation in full against the oracle.

@@ -16,9 +16,8 @@
 //!    after the first that removes less than a quarter (`drop`) of what the one before it did*: the
 //!    paper's "dramatic drop", for which it has no number (file `schedule.rs`).
 //! 5. Section 4.3: rounds by volume with a test of topology, parts in ascending order. Only parts of
-//!    level 1 go.
-//! 6. Parts named by hand go in the end (`remove`), as the left ear of figure 12 does. They are
-//!    listed with ids, the largest first, in [`medial::simplifier::Extras`], as [`PartInfo`].
+//!    level 1 go. The parts left are listed with ids, the largest first, in
+//!    [`medial::simplifier::Extras`], as [`PartInfo`]. Parts named by hand, as in figure 12, are left out.
 //!
 //! # The level
 //! `t_v` in per cent, for all rounds by volume. A number of spheres ends the published schedule as close
@@ -36,8 +35,7 @@
 //!   a seam, that has an edge of two triangles, and sheets grow together over it, by the rule of section
 //!   4.1.
 //! - Rounds without a test of topology are not harmless: on the built-in double torus they cut both
-//!   loops, on the bear with 35,000 samples of blue noise they leave 18 components. `topology=all` tests
-//!   there too.
+//!   loops, on the bear with 35,000 samples of blue noise they leave 18 components.
 //! - Pruning ends where all that is left is one sheet for each body, or sheets that hold loops, often
 //!   far above the requested number of spheres. The paper reports the same of the bunny's feet.
 //!
@@ -64,16 +62,13 @@
 //!   The results are 0.2 % larger. The paper merges equal corners before it makes the Voronoi diagram of
 //!   them; here those that stem from one sample are a little apart, and what the merging would not have
 //!   made is removed afterwards, as far as that keeps the topology: the facets between two of them
-//!   (`parts.rs`), and the vertices nearer than `merge` radii. Merged before, they contradict the dual complex
+//!   (`parts.rs`), and the vertices nearer than 1e-3 radii. Merged before, they contradict the dual complex
 //!   of the balls, and facets stay open.
 //! - The axis of the union is exact, not the subset of the Voronoi diagram of the corners that
 //!   intersects the power shape.
 //! - The inside test of the surface separates inner and outer poles.
-//! - A given medial mesh is pruned in place of step 1 (`axis=initial` does so with the Voronoi medial
-//!   mesh too). Where it was given, there are no poles on it: each interior tetrahedron counts for the face
-//!   nearest to its circumcentre. The Voronoi medial mesh holds all circumcentres, and each sphere
-//!   counts with its tetrahedron; its sheets are smaller and more, since Voronoi vertices near the surface
-//!   do not converge to the axis.
+//! - A given medial mesh is pruned in place of step 1. There are no poles on it: each interior tetrahedron
+//!   counts for the face nearest to its circumcentre.
 //! - A part that equals a threshold is removed.
 //! - The power crust of the remaining poles (section 5) is not made.
 
@@ -85,11 +80,11 @@ mod tests;
 
 use axis::Axis;
 use medial::Vec3;
-use medial::complex::{MedialMesh, betti};
+use medial::complex::MedialMesh;
 use medial::shape::Shape;
 use medial::simplifier::{
     Capability, Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, ParamFields,
-    RunContext, Simplification, Simplified, SimplifyError,
+    RunContext, Simplification, Simplified,
 };
 use parts::{Parts, Remaining};
 use schedule::Pruning;
@@ -116,8 +111,6 @@ pub struct PartInfo {
     pub centre: [f64; 3],
     /// Whether removing it leaves components and loops of the whole as they are.
     pub removable: bool,
-    /// Whether it was removed on demand, and is not in the medial mesh any more.
-    pub removed: bool,
 }
 
 /// Pruning by parts as a method.
@@ -145,7 +138,7 @@ pub fn method() -> Method<TamHeidrichParams> {
 fn prepare<'s>(shape: &'s Shape, params: TamHeidrichParams, run: &RunContext) -> Prepared<'s> {
     let params = params.validate()?;
     let mut diagnostics = Diagnostics::default();
-    let axis = Axis::of_shape(shape, &params, run, &mut diagnostics)?;
+    let axis = Axis::of_shape(shape, run, &mut diagnostics)?;
     Ok(Box::new(PreparedTamHeidrich { axis, params, diagnostics, run: run.clone() }))
 }
 
@@ -171,10 +164,8 @@ impl Simplification for PreparedTamHeidrich {
             Level::Native(t) => Some(t),
             _ => pruning.t_v,
         };
-        let Pruning { mut remaining, mut parts, mut diagnostics, .. } = pruning;
-        let mut listed = describe(&parts, &remaining);
-        self.remove_by_hand(&mut remaining, &mut parts, &mut listed, &mut diagnostics)?;
-        let extras = Extras::with(listed);
+        let Pruning { remaining, parts, diagnostics, .. } = pruning;
+        let extras = Extras::with(describe(&parts, &remaining));
         Ok(Simplified { mesh: remaining.mesh(), asked: level, native_level, diagnostics, extras })
     }
 }
@@ -191,45 +182,6 @@ impl PreparedTamHeidrich {
             }
             Level::Spheres(count) => Ok((published.clone(), count)),
         }
-    }
-
-    /// Step 6: removes parts without a test of topology, and reports the effect.
-    fn remove_by_hand(
-        &self,
-        remaining: &mut Remaining<'_>,
-        parts: &mut Parts,
-        listed: &mut [PartInfo],
-        diagnostics: &mut Diagnostics,
-    ) -> Result<()> {
-        let ids = &self.params.remove.0;
-        if ids.is_empty() {
-            return Ok(());
-        }
-        let before = betti(&remaining.mesh());
-        let order = by_size(parts);
-        for &id in ids {
-            let Some(part) = listed.get_mut(id as usize) else {
-                return Err(SimplifyError::Parameter(format!(
-                    "remove: there is no part {id}: at this level the axis has the parts 0 to {}",
-                    order.len().saturating_sub(1)
-                )));
-            };
-            // An id that is listed twice is removed once.
-            if !std::mem::replace(&mut part.removed, true) {
-                parts.remove(order[id as usize], remaining);
-            }
-        }
-        let after = betti(&remaining.mesh());
-        diagnostics.count("removed_by_hand", listed.iter().filter(|p| p.removed).count());
-        for (name, number) in ["b0", "b1", "b2"].into_iter().zip(after) {
-            diagnostics.count(&format!("by_hand_{name}"), number as usize);
-        }
-        if before != after {
-            diagnostics.warn(format!(
-                "removing parts by hand changed the Betti numbers from {before:?} to {after:?}"
-            ));
-        }
-        Ok(())
     }
 }
 
@@ -271,7 +223,6 @@ fn describe(parts: &Parts, remaining: &Remaining<'_>) -> Vec<PartInfo> {
         volume: parts.volume[part],
         centre: centroid(&remaining.axis.mesh, parts.faces(part)).to_array(),
         removable: parts.free[part] && parts.is_removable(part),
-        removed: false,
     });
     described.collect()
 }
@@ -308,9 +259,6 @@ medial::parameters! {
     /// Parameters of part pruning; the default is the paper's usual schedule.
     #[derive(Clone, Debug, PartialEq)]
     pub struct TamHeidrichParams {
-        /// The first rounds remove parts of at most this many triangles, without a test of the
-        /// topology.
-        t_t: usize = 5, "triangles";
         /// Largest number of rounds by triangle count; 0 for none.
         t_t_rounds: usize = 3, "rounds";
         /// These rounds end after one that removed less than this share of the previous one; 0 for the
@@ -318,45 +266,7 @@ medial::parameters! {
         drop: f64 = 0.25, "share";
         /// The later rounds remove parts of at most this volume, as far as the topology allows.
         t_v: List<f64> = List(vec![1.0, 1.0]), "per cent of the solid's volume, one for each round";
-        /// The rounds that keep loops and components: those by volume, as published, all, or none.
-        topology: Checked = Checked::Volume, "volume, all or none";
-        /// The axis: that of the union of polar balls, or the initial medial mesh. `auto` takes the
-        /// latter where it was given.
-        axis: AxisChoice = AxisChoice::Auto, "auto, union or initial";
-        /// Parts to remove in the end, unchecked; ids are those of the list of parts of the same run
-        /// without this.
-        remove: List<u32> = List::default(), "ids of parts, separated by commas";
-        /// Factor of the radii of polar balls, so that balls that touch in a sample overlap.
-        radius_factor: f64 = 1.002, "pure number";
-        /// Largest seeded displacement of a polar ball along each axis.
-        jitter: f64 = 1e-7, "fraction of the radius";
-        /// Vertices of the axis nearer than this are merged, as far as the topology allows.
-        merge: f64 = 1e-3, "fraction of the radius";
     }
-}
-
-/// The rounds that keep loops and components.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Checked {
-    /// Those by volume, as published.
-    Volume,
-    /// All.
-    All,
-    /// None.
-    None,
-}
-
-/// The axis to work on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum AxisChoice {
-    /// The given medial mesh where the shape has one, else that of the polar balls.
-    Auto,
-    /// The medial axis of the union of the polar balls, or of the spheres of the given mesh.
-    Union,
-    /// The initial medial mesh, given or Voronoi.
-    Initial,
 }
 
 /// Numbers, written as one number, as `1,5`, or as a JSON array.
@@ -405,9 +315,6 @@ impl<T> From<List<T>> for Vec<T> {
 impl TamHeidrichParams {
     fn validate(self) -> Result<Self> {
         within("drop", self.drop, 0.0..=1.0)?;
-        within("radius_factor", self.radius_factor, 0.5..=2.0)?;
-        within("jitter", self.jitter, 0.0..=0.1)?;
-        within("merge", self.merge, 0.0..=0.1)?;
         self.t_v.0.iter().try_for_each(|&t| within("t_v", t, 0.0..=100.0))?;
         Ok(self)
     }

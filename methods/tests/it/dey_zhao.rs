@@ -57,24 +57,6 @@ fn a_plate_keeps_its_middle_sheet() {
 }
 
 #[test]
-fn each_condition_alone_keeps_a_part_and_both_keep_the_union() {
-    let shape = shape_of(&built_in("blob", 40), "vertices");
-    let faces = |condition: &str| {
-        let mesh = at(&shape, &[("condition", condition)], Level::Published).mesh;
-        let key = |v: u32| mesh.spheres[v as usize].centre.to_array().map(f64::to_bits);
-        let mut faces: Vec<_> = mesh.faces.iter().map(|f| f.map(key)).collect();
-        faces.sort_unstable();
-        faces
-    };
-    let [both, angle, ratio] = ["both", "angle", "ratio"].map(faces);
-    let mut union = [angle.clone(), ratio.clone()].concat();
-    union.sort_unstable();
-    union.dedup();
-    assert_eq!(both, union);
-    assert!(!ratio.is_empty() && ratio.len() < angle.len());
-}
-
-#[test]
 fn a_given_mesh_is_no_voronoi_diagram() {
     let mesh = built_in("capsule", 36);
     let shape = shape_of(&mesh, "vertices");
@@ -309,10 +291,11 @@ fn rules() -> [(Vec<(&'static str, &'static str)>, Rule); 4] {
     let angle = Some(FRAC_PI_2 - FRAC_PI_8);
     [
         (vec![], Rule { angle, ratio: Some(8.0) }),
-        (vec![("condition", "angle")], Rule { angle, ratio: None }),
-        (vec![("condition", "ratio")], Rule { angle: None, ratio: Some(8.0) }),
+        // Thresholds that nothing passes.
+        (vec![("rho", "1e12")], Rule { angle, ratio: None }),
+        (vec![("theta", "89.9999999")], Rule { angle: None, ratio: Some(8.0) }),
         // So few samples are far apart: a ratio that decides.
-        (vec![("condition", "ratio"), ("rho", "1.5")], Rule { angle: None, ratio: Some(1.5) }),
+        (vec![("theta", "89.9999999"), ("rho", "1.5")], Rule { angle: None, ratio: Some(1.5) }),
     ]
 }
 
