@@ -33,32 +33,43 @@ type Prepared<'s> = Result<Box<dyn Simplification + 's>>;
 pub fn registry() -> Vec<Registered> {
     let methods = vec![
         Registered::from(angle::method())
-            .best_for("Removing spikes of any size from the axis of dense samples, where thousands of spheres may stay."
+            .best_for(
+                "Removing spikes of any size from the axis of dense samples, where \
+                 thousands of spheres may stay.",
             )
             .filter(Level::Published)
             .sweep(&[30.0, 60.0, 120.0]),
         Registered::from(lambda::method())
-            .best_for("Removing features by absolute size from the axis of dense samples, with a proof that the rest is stable."
+            .best_for(
+                "Removing features by absolute size from the axis of dense samples, \
+                 with a proof that the rest is stable.",
             )
             .filter(Level::Published)
             .sweep(&[0.01, 0.02]),
         Registered::from(dey_zhao::method())
-            .best_for("An axis of dense samples of any shape, without a parameter to tune."
+            .best_for(
+                "An axis of dense samples of any shape, without a parameter to \
+                 tune.",
             )
             .filter(Level::Published)
             .sweep(&[1.0, 2.0, 3.0]),
-        Registered::from(qmat::method()).best_for("A small number of spheres in about a second, each placed where its error is least."
+        Registered::from(qmat::method()).best_for(
+            "A small number of spheres in about a second, each placed where its \
+             error is least.",
         ),
         Registered::from(pmat::method())
-            .best_for("All levels from one run, nested and without a parameter."
-            )
+            .best_for("All levels from one run, nested and without a parameter.")
             .sweep(&[2.0, 4.0, 8.0]),
         Registered::from(hem::method())
-            .best_for("Few spheres for a given error where speed matters less, usually fewer than Q-MAT needs."
+            .best_for(
+                "Few spheres for a given error where speed matters less, usually \
+                 fewer than Q-MAT needs.",
             )
             .sweep(&[0.01, 0.02, 0.04]),
         Registered::from(sat::method())
-            .best_for("Removing features that are small for their surroundings, while equally small ones elsewhere stay."
+            .best_for(
+                "Removing features that are small for their surroundings, while \
+                 equally small ones elsewhere stay.",
             )
             .filter(Level::Published)
             .sweep(&[1.1, 1.5, 2.0]),
@@ -67,28 +78,34 @@ pub fn registry() -> Vec<Registered> {
             .sweep(&[1.1, 1.5, 2.0])
             .on_request(),
         Registered::from(tam_heidrich::method())
-            .best_for("Removing whole features of little volume, while loops stay."
-            )
+            .best_for("Removing whole features of little volume, while loops stay.")
             .filter(Level::Published)
             .sweep(&[1.0, 5.0]),
         Registered::from(aof::method())
-            .best_for("An axis of thousands of spheres straight from the surface, where its samples give too poor a start."
+            .best_for(
+                "An axis of thousands of spheres straight from the surface, where \
+                 its samples give too poor a start.",
             )
             // The published lattice takes far longer: that of the other levels is enough.
             .filter(Level::Native(30.0))
             .sweep(&[15.0, 30.0, 60.0]),
         Registered::from(coverage_axis::method())
-            .best_for("Some tens of spheres as a skeleton, each where the medial axis has it."
+            .best_for(
+                "Some tens of spheres as a skeleton, each where the medial axis has \
+                 it.",
             )
             .sweep(&[0.01, 0.02, 0.05]),
         Registered::from(vmas::method())
-            .best_for("Up to a few hundred evenly spread spheres of an organic shape."
-            )
+            .best_for("Up to a few hundred evenly spread spheres of an organic shape.")
             .on_request(),
-        Registered::from(tight::method(qmat::method())).best_for("The least two-sided error with few spheres, for 4 to 24 CPU seconds a count up to 500."
+        Registered::from(tight::method(qmat::method())).best_for(
+            "The least two-sided error with few spheres, for 4 to 24 CPU \
+             seconds a count up to 500.",
         ),
         Registered::from(cover::method())
-            .best_for("Spheres alone as in collision models, with a certified bound of the deviation."
+            .best_for(
+                "Spheres alone as in collision models, with a certified bound of \
+                 the deviation.",
             )
             .on_request(),
     ];

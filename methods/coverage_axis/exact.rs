@@ -52,7 +52,7 @@ pub(super) enum End {
 /// When the reduced problem is too large, or the solver fails.
 pub(super) fn cover(coverage: &Coverage, run: &RunContext) -> Result<Cover> {
     let uncoverable = coverage.columns() - size(&coverage.coverable());
-    let reduced = reduce(coverage);
+    let reduced = reduce(coverage, run)?;
     run.step(0, 1)?;
     let entries: usize = reduced.rows.iter().map(Vec::len).sum();
     if entries > MOST_ENTRIES {
@@ -197,14 +197,16 @@ struct State {
 ///
 /// # Cost
 /// For each ball, the balls that cover its rarest sample are compared with it; for samples likewise.
-pub(super) fn reduce(coverage: &Coverage) -> Reduced {
+pub(super) fn reduce(coverage: &Coverage, run: &RunContext) -> Result<Reduced> {
     let transposed = coverage.transposed();
     let [samples_of, balls_of] = [coverage, &transposed]
         .map(|matrix| (0..matrix.rows()).map(|row| matrix.row(row).to_vec()).collect());
     let mut state = State { samples_of, balls_of, forced: Vec::new() };
     // No short circuit: each round applies all three.
-    while state.force() | state.drop_balls() | state.drop_samples() {}
-    state.finish()
+    while state.force() | state.drop_balls() | state.drop_samples() {
+        run.check()?;
+    }
+    Ok(state.finish())
 }
 
 impl State {

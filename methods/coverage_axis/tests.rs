@@ -155,7 +155,7 @@ fn an_exact_cover_has_no_more_balls_than_a_greedy_one() {
         let cover = exact_cover(&coverage);
         assert_covers(&coverage, &cover.chosen);
         let greedy = choose(&balls, &coverage, 1000).chosen.len();
-        let reduced = exact::reduce(&coverage);
+        let reduced = exact::reduce(&coverage, &RunContext::default()).unwrap();
         let largest = exact::largest_first(&reduced).len() + reduced.forced.len();
         let fewest = cover.chosen.len();
         assert_eq!(cover.bound, fewest);

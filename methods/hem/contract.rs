@@ -72,7 +72,12 @@ struct Change {
 
 impl Contraction {
     /// Step 1: the samples of each sphere and the errors of all edges.
-    pub(super) fn new(mesh: &MedialMesh, samples: SampleLists, params: HemParams) -> Self {
+    pub(super) fn new(
+        mesh: &MedialMesh,
+        samples: SampleLists,
+        params: HemParams,
+        run: &RunContext,
+    ) -> Result<Self> {
         let mut contraction = Self {
             inside: params.inside,
             complex: CollapseComplex::from_mesh(mesh).recording(),
@@ -83,14 +88,14 @@ impl Contraction {
             largest: 0.0,
             tally: Tally::default(),
         };
-        contraction.evaluate_all(&mesh.edges);
-        contraction
+        contraction.evaluate_all(&mesh.edges, run)?;
+        Ok(contraction)
     }
 
-    fn evaluate_all(&mut self, all: &[[u32; 2]]) {
+    fn evaluate_all(&mut self, all: &[[u32; 2]], run: &RunContext) -> Result<()> {
         let ground = self.ground();
         let vertices = self.samples.spheres();
-        let jobs: Vec<(Vec<Edge>, u64)> = all
+        let jobs: Result<Vec<(Vec<Edge>, u64)>> = all
             .par_chunks(JOB)
             .map(|chunk| {
                 let mut star = Star::new(vertices);
@@ -100,9 +105,12 @@ impl Contraction {
                     edge.queued = edge.cost();
                     edge
                 });
-                (evaluated.collect(), star.distances)
+                let evaluated = evaluated.collect();
+                run.check()?;
+                Ok((evaluated, star.distances))
             })
             .collect();
+        let jobs = jobs?;
         // Jobs come back in order, so candidates line up with edges for any thread order.
         let edges = jobs.iter().flat_map(|(edges, _)| edges);
         let candidates = all
@@ -114,6 +122,7 @@ impl Contraction {
         self.star.distances += jobs.iter().map(|(_, distances)| distances).sum::<u64>();
         (self.queue, self.edges) = (queue, edges);
         self.tally.evaluations += all.len();
+        Ok(())
     }
 
     fn ground(&self) -> Ground<'_> {

@@ -175,7 +175,7 @@ fn prepare<'s>(shape: &'s Shape, params: HemParams, run: &RunContext) -> Prepare
     let mut remarks = Diagnostics::default();
     let samples = SampleLists::of_contacts(&shape.contacts(&initial, &mut remarks)?);
     let ruler = Ruler { samples: samples.touched(), inside: params.inside };
-    let contraction = Contraction::new(&initial, samples.clone(), params);
+    let contraction = Contraction::new(&initial, samples.clone(), params, run)?;
     let run = run.clone();
     Ok(Box::new(PreparedHem { initial, samples, params, ruler, run, remarks, contraction }))
 }
@@ -282,7 +282,8 @@ impl PreparedHem {
 
     fn contract(&mut self, stop: Stop, restart: bool) -> Result<()> {
         if restart {
-            self.contraction = Contraction::new(&self.initial, self.samples.clone(), self.params);
+            let Self { initial, samples, params, run, .. } = self;
+            self.contraction = Contraction::new(initial, samples.clone(), *params, run)?;
         }
         self.contraction.run_to(stop, &self.run)
     }

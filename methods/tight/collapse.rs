@@ -82,13 +82,30 @@ pub(super) struct Passed {
 ///
 /// A `careful` pass looks at little more than the edges that it needs, and leaves the rest to the next one,
 /// which prices them again. Where each collapse would fold a face or make faces cross the cheapest of these are made.
-pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Option<Passed> {
-    let strict =
-        if descent.guard.is_tangled() { None } else { passed(descent, target, careful, true) };
-    strict.or_else(|| passed(descent, target, careful, false))
+///
+/// # Errors
+/// When the run is cancelled.
+pub(super) fn pass(
+    descent: &Descent<'_>,
+    target: usize,
+    careful: bool,
+    run: &RunContext,
+) -> Result<Option<Passed>> {
+    if !descent.guard.is_tangled()
+        && let Some(strict) = passed(descent, target, careful, true, run)?
+    {
+        return Ok(Some(strict));
+    }
+    passed(descent, target, careful, false, run)
 }
 
-fn passed(descent: &Descent<'_>, target: usize, careful: bool, strict: bool) -> Option<Passed> {
+fn passed(
+    descent: &Descent<'_>,
+    target: usize,
+    careful: bool,
+    strict: bool,
+    run: &RunContext,
+) -> Result<Option<Passed>> {
     let mesh = &descent.mesh;
     let mut complex = CollapseComplex::from_mesh(mesh);
     let stars = Stars::new(descent);
@@ -96,8 +113,9 @@ fn passed(descent: &Descent<'_>, target: usize, careful: bool, strict: bool) -> 
     let wanted = if careful { needed * 3 / 2 + 1 } else { mesh.edges.len() };
     let mut merged = vec![false; mesh.spheres.len()];
     let mut sheets = Sheets::new(mesh, strict);
-    let priced = stars.cheapest(&complex, &sheets, descent.goal, wanted);
-    let dearest = priced.last()?.price.max(0.0);
+    let priced = stars.cheapest(&complex, &sheets, descent.goal, wanted, run)?;
+    let Some(last) = priced.last() else { return Ok(None) };
+    let dearest = last.price.max(0.0);
     for Priced { ends: [a, b], sphere, .. } in priced {
         if complex.sphere_count() <= target {
             break;
@@ -127,7 +145,8 @@ fn passed(descent: &Descent<'_>, target: usize, careful: bool, strict: bool) -> 
     // The mesh numbers the spheres that are left in their order.
     let of = complex.vertices().map(|v| (!merged[v as usize]).then_some(v));
     let of: Vec<Option<u32>> = of.collect();
-    (complex.sphere_count() < mesh.spheres.len()).then(|| Passed { mesh: complex.to_mesh(), of })
+    Ok((complex.sphere_count() < mesh.spheres.len())
+        .then(|| Passed { mesh: complex.to_mesh(), of }))
 }
 
 /// The samples that each simplex serves, and each sphere's share of the squares.
@@ -212,7 +231,8 @@ impl<'a> Stars<'a> {
         sheets: &Sheets<'_>,
         goal: &Goal,
         wanted: usize,
-    ) -> Vec<Priced> {
+        run: &RunContext,
+    ) -> Result<Vec<Priced>> {
         let edges = 0..self.mesh.edges.len();
         let mut order: Vec<(f64, usize)> =
             edges.into_par_iter().map(|e| (self.rough_price(complex, e), e)).collect();
@@ -223,14 +243,17 @@ impl<'a> Stars<'a> {
             // A complex for each piece of work, because the homotopy test marks vertices.
             let priced = block.par_iter().map_init(
                 || complex.clone(),
-                |complex, &(_, e)| self.price(complex, sheets, goal, e, limit),
+                |complex, &(_, e)| {
+                    run.check()?;
+                    Ok(self.price(complex, sheets, goal, e, limit))
+                },
             );
-            let priced: Vec<Option<Priced>> = priced.collect();
+            let priced = priced.collect::<Result<Vec<Option<Priced>>>>()?;
             found.extend(priced.into_iter().flatten());
             found.sort_by(|x, y| x.price.total_cmp(&y.price).then(x.ends.cmp(&y.ends)));
             found.truncate(wanted);
         }
-        found
+        Ok(found)
     }
 
     /// The price with the merged sphere at the midpoint, by a few samples.

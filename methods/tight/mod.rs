@@ -243,7 +243,7 @@ fn passed<'a>(
     near: usize,
     run: &RunContext,
 ) -> Result<Option<Descent<'a>>> {
-    let Some(passed) = collapse::pass(descent, target, near == 1) else { return Ok(None) };
+    let Some(passed) = collapse::pass(descent, target, near == 1, run)? else { return Ok(None) };
     let mut smaller = Descent::new(descent.goal, descent.points.clone(), passed.mesh)?;
     smaller.run(Objective::power(POWER, smaller.largest()), STEPS[near], run)?;
     Ok(Some(smaller))

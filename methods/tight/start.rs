@@ -272,7 +272,7 @@ pub(super) fn swapped<'a>(
     let mut trial = descent.edited(mesh, &of)?;
     while trial.mesh.spheres.len() > count {
         run.step(0, 1)?;
-        let Some(Passed { mut mesh, of }) = collapse::pass(&trial, count, true) else {
+        let Some(Passed { mut mesh, of }) = collapse::pass(&trial, count, true, run)? else {
             return Ok(None);
         };
         settle(&trial, &mut mesh, &of, &COLLAPSED, run)?;

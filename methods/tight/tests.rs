@@ -176,7 +176,8 @@ fn an_edited_mesh_has_the_residuals_of_a_new_one() {
     let shape = shape("bracket", 6);
     let goal = Goal::new(&shape, 0).unwrap();
     let before = Descent::new(&goal, goal.points(40), start(&shape, 40)).unwrap();
-    let Passed { mesh, of } = pass(&before, 30, true).expect("edges are left");
+    let Passed { mesh, of } =
+        pass(&before, 30, true, &RunContext::default()).unwrap().expect("edges are left");
     assert!(mesh.spheres.len() < 40 && of.contains(&None));
     let edited = before.edited(mesh.clone(), &of).unwrap();
     let anew = Descent::new(&goal, before.points.clone(), mesh).unwrap();
