@@ -17,47 +17,53 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-use super::collapse::Part;
+use super::swap::Part;
 use crate::Result;
 
 /// Samples of the surface, below 500 spheres and from there on.
 const SAMPLES: [usize; 2] = [6_000, 12_000];
 
-/// Samples along sharp edges, a share of those. With a quarter, a face grew across a hole of `abc_bracket`.
+/// Samples along sharp edges, as a share of those. With a quarter, a face grew across a hole of
+/// `abc_bracket`.
 const SHARE_OF_EDGES: f64 = 0.1;
 
-/// Samples of the surface from which the largest errors are searched, and twice as many of the union. More gave
-/// the same errors at 100 spheres.
+/// Samples of the surface from which the largest errors are searched. The union has twice as many. More
+/// gave the same errors at 100 spheres.
 const SEARCHED: usize = 8_000;
 
-/// There are at most this many times fewer vertices among the samples.
+/// Samples for each vertex of the surface among them, at least.
 const SHARE_OF_VERTICES: usize = 4;
 
-/// Makes the random numbers differ from those of the start and of the judge with the same seed.
+/// Constant that separates the random numbers from those of the start and of the judge with the same
+/// seed.
 const STREAM: u64 = 0x7469_6768_7421_0a0b;
 
-/// Weight of a vertex of the surface and of a point inside; an area-uniform sample has 1.
+/// Weight of a vertex of the surface and of a point inside. An area-uniform sample has 1.
 pub(super) const ASIDE: f64 = 0.3;
 
-/// Cosine of the angle by which the surface turns at a sharp edge, and the least distance of samples along it.
+/// Cosine of the angle by which the surface turns at a sharp edge, at most.
 const SHARP: f64 = 0.866;
+/// Smallest distance of samples along sharp edges, a fraction of the diagonal.
 const CLOSEST: f64 = 1e-3;
 
 /// Interior points that are residuals from the start, below 500 spheres and from there on.
 const INTERIOR: [usize; 2] = [2_500, 4_000];
 
-/// Interior points among which uncovered ones are looked for.
+/// Interior points among which uncovered ones are searched.
 const POOL: usize = 20_000;
 
 /// Cells along the longest side of the grid in which interior points are laid out.
 const GRID: usize = 40;
 
-/// How far below the surface a clamped centre is, so that rounding does not leave it outside.
+/// Depth of a clamped centre below the surface, a fraction of the diagonal, so that rounding does not
+/// leave it outside.
 const WITHIN: f64 = 1e-9;
 
-/// Times that a ball is shrunk at most; the share of its radius that may be occupied; its least radius.
+/// Limit of the steps that shrink a ball.
 const SHRINKS: usize = 30;
+/// Share of the radius of a ball that may be occupied.
 const EMPTY: f64 = 1e-3;
+/// Smallest radius of a shrunk ball, a fraction of the diagonal.
 const SMALLEST_BALL: f64 = 1e-4;
 
 /// A point and how much it counts.
@@ -365,20 +371,23 @@ pub(super) fn refused(error: MetricError) -> SimplifyError {
 // `d sigma / d c_j = -a_j u`, `d sigma / d r_j = -a_j`. The weights `a` may be held, because `sigma` is a
 // minimum over them (the envelope theorem).
 
-/// Depth from which on an uncovered interior point counts alike, before the rounds.
+/// Depth from which on uncovered interior points count alike before the rounds, a fraction of the
+/// diagonal.
 pub(super) const DEEP: f64 = 0.02;
 
 /// Weight of a point of the medial mesh whose ball may protrude.
 const PROTRUDING: f64 = 0.3;
 
-/// Points of the medial mesh at which balls are watched for protruding. Twice as many gave the same errors.
+/// Points of the medial mesh at which balls are watched for protruding. Twice as many gave the same
+/// errors.
 const HELD: usize = 1_500;
 
-/// How much farther than needed the depth of a ball is looked for, in ways that it moved last.
+/// Additional range of a search for the depth of a ball, in its last movements. Spares the next search.
 const FARTHER: f64 = 0.5;
 
-/// Golden ratio's fractional part, and the two of the plastic number: steps of the sequences.
+/// Fractional part of the golden ratio: offset of the sequence of points on a face.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
+/// Steps of that sequence, by the plastic number.
 const PLASTIC: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 
 /// A residual `error`, whose derivative by the `j`-th sphere of its simplex is

@@ -7,10 +7,12 @@ use medial::surface::TriMesh;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::collapse::{Guard, Passed, Still, pass, settle};
+use super::block_cholesky::{Normal, Pattern};
+use super::collapse::{Passed, pass};
+use super::descent::{Descent, Objective};
 use super::goal::{Goal, Row, vertices};
-use super::rounds::{Descent, Normal, Objective, Pattern};
-use super::start::{Sheets, swapped};
+use super::guard::{Guard, Sheets, Still};
+use super::swap::{settle, swapped};
 
 fn shape(id: &str, resolution: u32) -> Shape {
     let mesh = medial_datasets::find(id).expect("in the catalogue").mesh(resolution);

@@ -143,7 +143,6 @@ fn the_number_of_threads_changes_nothing() {
         ("pmat", &[]),
         ("vmas", &[]),
         ("vmas", &vertices),
-        ("vmas", &[("contact", "mesh")]),
         ("cover", &[]),
     ] {
         let [one, two] = [1, 2].map(|threads| {
