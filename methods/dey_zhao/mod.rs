@@ -55,7 +55,7 @@ use medial::shape::Shape;
 use medial::simplifier::{Diagnostics, Method, MethodInfo, NativeLevel, ParamFields, RunContext};
 use umbrella::{Place, Umbrellas};
 
-use crate::levels::{ByKnob, within};
+use crate::levels::{BySamples, within};
 use crate::ranked::{FacetSet, FacetValue, Published, RankedFacets, Scale};
 use crate::{Prepared, Result};
 
@@ -105,7 +105,7 @@ pub fn method() -> Method<DeyZhaoParams> {
 fn prepare<'s>(shape: &'s Shape, params: DeyZhaoParams, run: &RunContext) -> Prepared<'s> {
     let params = params.validate()?;
     FacetSet::refuse_given(shape)?;
-    Ok(Box::new(ByKnob::of_samples(shape, PUBLISHED, run, move |shape| {
+    Ok(Box::new(BySamples::new(shape, PUBLISHED, run, move |shape| {
         Ok(Box::new(selection(shape, params)?))
     })?))
 }

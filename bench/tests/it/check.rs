@@ -62,9 +62,7 @@ fn every_method_passes_the_core_cases() {
 #[test]
 #[ignore = "minutes; run nightly"]
 fn variants_pass() {
-    for variant in ["facet", "homotopy"] {
-        assert_passes(check(MEDIAL, &["angle", "--set", &format!("variant={variant}")]), 1);
-    }
+    assert_passes(check(MEDIAL, &["angle", "--set", "variant=facet"]), 1);
     assert_passes(check(MEDIAL, &["lambda", "--set", "variant=cell"]), 1);
     // Without a limit of rounds it takes minutes for a sphere count that it cannot reach.
     assert_passes(check(MEDIAL, &["vmas", "--set", "iterations=20"]), 1);

@@ -11,7 +11,7 @@ use crate::common::{built_in, default_shape, levels, params, shape, shape_of, wi
 fn wrong_parameters_are_refused_by_name() {
     let shape = default_shape("box");
     for (method, wrong) in [
-        ("angle", "variant=cell theta=181"),
+        ("angle", "variant=cell"),
         ("lambda", "variant=facet"),
         ("dey-zhao", "theta=0 theta=90 rho=0 rho=-8"),
         ("qmat", "k=-1 k_boundary=-1 topology_from=some"),

@@ -2,15 +2,12 @@
 //! incidence, topology, scale.
 
 use medial::Vec3;
-use medial::complex::{MedialMesh, betti};
+use medial::complex::MedialMesh;
 use medial::geometry::enclosing_ball;
 use medial::shape::Shape;
 use medial::simplifier::{Level, RunContext, SimplifyError};
 
-use crate::common::{
-    CELL, FACET, HOMOTOPY, at, built_in, count, default_shape, levels, params, sampled, shape,
-    shape_of,
-};
+use crate::common::{CELL, FACET, at, built_in, default_shape, levels, params, shape, shape_of};
 
 /// A solid box around the origin, in the shape's units: its half sides, descending, and how far a point
 /// is from the central rectangle.
@@ -163,24 +160,6 @@ fn lambda_cells_are_nested_and_meet_counts() {
 }
 
 #[test]
-fn sheets_go_without_a_change_of_topology() {
-    for id in ["sphere", "box", "plate", "capsule", "torus", "hollow-sphere", "bracket", "pair"] {
-        let shape = default_shape(id);
-        let initial = shape.voronoi().expect("a mesh");
-        let expected = betti(&initial);
-        let wanted = [0.0, 30.0, 60.0, 91.0, 120.0, 150.0, 180.0].map(Level::Native);
-        let mut last = initial.spheres.len();
-        for (level, theta) in levels(&shape, "angle", HOMOTOPY, &wanted).into_iter().zip(wanted) {
-            let mesh = level.expect("in range").mesh;
-            mesh.check().expect("valid");
-            assert_eq!(betti(&mesh), expected, "{id} {theta}");
-            assert!(mesh.spheres.len() <= last, "{id} {theta}");
-            last = mesh.spheres.len();
-        }
-    }
-}
-
-#[test]
 fn kept_items_among_ties_are_spread_over_the_shape() {
     // All facets of the middle sheet tie, and cut by their numbers they would be one end of it.
     let shape = default_shape("plate");
@@ -202,7 +181,7 @@ fn variants_of_voronoi_facets_refuse_a_given_mesh() {
         let back = *shape.normalisation();
         shape_of(&mesh).with_initial(&given.transformed(back.diagonal, |p| back.backward(p)))
     };
-    for (method, set) in [("angle", FACET), ("angle", HOMOTOPY), ("lambda", CELL)] {
+    for (method, set) in [("angle", FACET), ("lambda", CELL)] {
         let method = medial_methods::find(method).expect("registered");
         let refused = method.prepare(&shape, &params(set), &RunContext::default()).err();
         assert!(matches!(refused, Some(SimplifyError::Unsupported { .. })), "{set:?}");
@@ -216,7 +195,7 @@ fn variants_of_voronoi_facets_refuse_a_given_mesh() {
 #[test]
 fn counts_are_met_from_below_or_with_a_warning() {
     let shape = default_shape("bracket");
-    let all = [("angle", FACET), ("angle", HOMOTOPY), ("lambda", CELL)];
+    let all = [("angle", FACET), ("lambda", CELL)];
     for (method, set) in all {
         let wanted = [600, 100, 20].map(Level::Spheres);
         for (found, count) in levels(&shape, method, set, &wanted).into_iter().zip([600, 100, 20]) {
@@ -233,7 +212,7 @@ fn counts_are_met_from_below_or_with_a_warning() {
 #[test]
 fn the_published_level_is_announced_and_is_a_native_one() {
     let shape = default_shape("bracket");
-    let all = [("angle", FACET), ("angle", HOMOTOPY), ("lambda", CELL)];
+    let all = [("angle", FACET), ("lambda", CELL)];
     for (method, set) in all.into_iter().chain([("angle", [].as_slice()), ("lambda", &[])]) {
         let published =
             levels(&shape, method, set, &[Level::Published]).remove(0).expect("a level");
@@ -251,33 +230,4 @@ fn the_published_level_is_announced_and_is_a_native_one() {
     });
     let longest = sides.into_iter().fold(0.0, f64::max);
     assert_eq!(lambda.native_level, Some(0.02 * longest));
-}
-
-#[test]
-fn a_number_by_sampling_is_the_native_level_of_that_sampling() {
-    let mesh = built_in("blob");
-    let shape = shape_of(&mesh);
-    let found = levels(&shape, "angle", HOMOTOPY, &[Level::Spheres(300)]).remove(0).expect("300");
-    assert!((294..=300).contains(&found.mesh.spheres.len()));
-    let native = Level::Native(found.native_level.expect("theta"));
-    let sampling = format!("blue:{}", count(&found, "samples"));
-    assert_eq!(found.mesh, at(&sampled(&mesh, &sampling), "angle", HOMOTOPY, native));
-}
-
-#[test]
-fn few_spheres_by_sheets_are_spread_as_well_as_by_vertices() {
-    for id in ["blob", "bracket", "torus"] {
-        let shape = default_shape(id);
-        let axis = shape.voronoi().expect("a mesh");
-        let farthest = |set| {
-            let kept = at(&shape, "angle", set, Level::Spheres(100)).spheres;
-            let far = axis.spheres.iter().map(|s| {
-                let distances = kept.iter().map(|k| k.centre.distance(s.centre));
-                distances.fold(f64::INFINITY, f64::min)
-            });
-            far.fold(0.0, f64::max)
-        };
-        let [sheets, vertices] = [HOMOTOPY, &[]].map(farthest);
-        assert!(sheets <= 1.3 * vertices, "{id}: {sheets}, by vertices {vertices}");
-    }
 }
