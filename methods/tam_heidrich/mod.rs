@@ -51,8 +51,7 @@
 //!   contact curves, or whose removal disconnects its neighbours. That graph sees neither a hole in
 //!   a part nor a part that is bound to one connected contact curve at two ends, and a removal as it permits
 //!   can lose a loop. Here the part's Euler number decides, which is exact and needs no graph (proof in
-//!   `parts.rs`); what passes it passes the graph too. The graph is built and counted in the diagnostics
-//!   (`graph_loops`; `refused_leaves`: parts that only the exact test kept).
+//!   `parts.rs`).
 //! - Edges without triangles stay: on tubes they carry the loops. A part that is a whole component
 //!   stays, also in the rounds without a test.
 //! - Inner poles that are equally far from their sample, up to rounding, are all taken. On a grid which of

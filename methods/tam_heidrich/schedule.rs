@@ -9,7 +9,7 @@ use medial::simplifier::{Diagnostics, RunContext};
 
 use super::TamHeidrichParams;
 use super::axis::Axis;
-use super::parts::{Graph, Parts, Remaining};
+use super::parts::{Parts, Remaining};
 use crate::Result;
 
 /// `t_t`: largest number of triangles of a part that the rounds by triangle count remove.
@@ -128,8 +128,7 @@ impl<'a> Pruning<'a> {
         self.run.step(self.rounds, self.rounds + 1)?;
         let candidates = self.candidates(measure);
         let checked = matches!(measure, Measure::Volume(_));
-        let graph = checked.then(|| Graph::of(&self.parts, &self.remaining));
-        let (mut removed, mut refused, mut leaves) = (0, 0, 0);
+        let (mut removed, mut refused) = (0, 0);
         for (done, &part) in candidates.iter().enumerate() {
             if self.is_enough() {
                 break;
@@ -146,7 +145,6 @@ impl<'a> Pruning<'a> {
                 removed += usize::from(self.remove(part));
             } else {
                 refused += 1;
-                leaves += usize::from(graph.as_ref().is_some_and(|g| g.is_leaf[part]));
             }
         }
         self.rounds += 1;
@@ -155,11 +153,8 @@ impl<'a> Pruning<'a> {
             Measure::Triangles(_) => None,
         };
         let name = format!("round_{}", self.rounds);
-        let mut counts = vec![("removed", removed), ("refused", refused)];
-        if let Some(graph) = graph {
-            let of_graph = [("nodes", graph.nodes), ("graph_loops", graph.loops)];
-            counts.extend(of_graph.into_iter().chain([("refused_leaves", leaves)]));
-        }
+        let counts =
+            [("checked", usize::from(checked)), ("removed", removed), ("refused", refused)];
         // Parts that lost a neighbour may have merged, or have a free edge now.
         if removed > 0 {
             self.parts = Parts::of(&self.remaining);

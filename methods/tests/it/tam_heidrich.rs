@@ -26,7 +26,8 @@ fn betti_by_round(result: &Simplified) -> Vec<(bool, [u64; 3])> {
     rounds.extend((1..).map(|k| format!("round_{k}")).take_while(|r| has(&format!("{r}_b0"))));
     let of_round = |round: &String| {
         let betti = ["b0", "b1", "b2"].map(|b| count(result, &format!("{round}_{b}")));
-        (has(&format!("{round}_nodes")), betti)
+        let checked = format!("{round}_checked");
+        (has(&checked) && count(result, &checked) == 1, betti)
     };
     rounds.iter().map(of_round).collect()
 }
