@@ -87,10 +87,10 @@ pub fn method() -> Method<AngleParams> {
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(shape: &'s Shape, params: AngleParams, _run: &RunContext) -> Prepared<'s> {
+fn prepare<'s>(shape: &'s Shape, params: AngleParams, run: &RunContext) -> Prepared<'s> {
     Ok(match params.variant {
-        Variant::Vertex => Box::new(rank_spheres(shape)?),
-        Variant::Facet => Box::new(rank_facets(shape)?),
+        Variant::Vertex => Box::new(rank_spheres(shape, run)?),
+        Variant::Facet => Box::new(rank_facets(shape, run)?),
     })
 }
 
@@ -110,7 +110,7 @@ fn prepare<'s>(shape: &'s Shape, params: AngleParams, _run: &RunContext) -> Prep
 //   has no angle; it gets `S = 0` and goes first.
 
 /// Ranks the spheres of the initial medial mesh. `O(n log n)`.
-fn rank_spheres(shape: &Shape) -> Result<Ranked> {
+fn rank_spheres(shape: &Shape, run: &RunContext) -> Result<Ranked> {
     let mesh = shape.initial()?;
     let mut diagnostics = Diagnostics::default();
     let contacts = shape.contacts(&mesh, &mut diagnostics)?;
@@ -119,9 +119,11 @@ fn rank_spheres(shape: &Shape) -> Result<Ranked> {
         .par_iter()
         .enumerate()
         .map(|(sphere, &s)| {
-            contacts.with(sphere, |points| separation_angle(s.centre, points)).to_degrees()
+            run.check()?;
+            let angle = contacts.with(sphere, |points| separation_angle(s.centre, points));
+            Ok(angle.to_degrees())
         })
-        .collect();
+        .collect::<Result<_>>()?;
     Ok(Ranked::new(mesh, value, scale(), diagnostics))
 }
 
@@ -139,7 +141,7 @@ fn rank_spheres(shape: &Shape) -> Result<Ranked> {
 //   measured. The scale axis tool uses the mean of the vertices for its own filter.
 
 /// Ranks the Voronoi facets. `O(n)` for their vertices.
-fn rank_facets(shape: &Shape) -> Result<RankedFacets<'static>> {
+fn rank_facets(shape: &Shape, run: &RunContext) -> Result<RankedFacets<'static>> {
     let set = FacetSet::of(shape)?;
     let delaunay = shape.delaunay()?;
     let values: Vec<f64> = (0..set.facets.len())
@@ -152,6 +154,7 @@ fn rank_facets(shape: &Shape) -> Result<RankedFacets<'static>> {
             angle_from(vertices.sum::<Vec3>() / count, ends)
         })
         .collect();
+    run.check()?;
     Ok(RankedFacets::new(set, values, scale(), Diagnostics::default()))
 }
 

@@ -98,10 +98,10 @@ pub fn method() -> Method<LambdaParams> {
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(shape: &'s Shape, params: LambdaParams, _run: &RunContext) -> Prepared<'s> {
+fn prepare<'s>(shape: &'s Shape, params: LambdaParams, run: &RunContext) -> Prepared<'s> {
     Ok(match params.variant {
-        Variant::Vertex => Box::new(rank_spheres(shape)?),
-        Variant::Cell => Box::new(rank_cells(shape)?),
+        Variant::Vertex => Box::new(rank_spheres(shape, run)?),
+        Variant::Cell => Box::new(rank_cells(shape, run)?),
     })
 }
 
@@ -117,14 +117,17 @@ fn prepare<'s>(shape: &'s Shape, params: LambdaParams, _run: &RunContext) -> Pre
 //   induced subcomplex supports a number of spheres like every other method.
 
 /// Ranks the spheres of the initial medial mesh. `O(n log n)`.
-fn rank_spheres(shape: &Shape) -> Result<Ranked> {
+fn rank_spheres(shape: &Shape, run: &RunContext) -> Result<Ranked> {
     let mesh = shape.initial()?;
     let mut diagnostics = Diagnostics::default();
     let contacts = shape.contacts(&mesh, &mut diagnostics)?;
     let value = (0..mesh.spheres.len())
         .into_par_iter()
-        .map(|sphere| contacts.with(sphere, |points| enclosing_ball(points).1))
-        .collect();
+        .map(|sphere| {
+            run.check()?;
+            Ok(contacts.with(sphere, |points| enclosing_ball(points).1))
+        })
+        .collect::<Result<_>>()?;
     let scale = scale(&mesh);
     Ok(Ranked::new(mesh, value, scale, diagnostics))
 }
@@ -165,7 +168,7 @@ pub(super) struct Cells {
 }
 
 /// Step 1. `O(n log n)`.
-fn rank_cells(shape: &Shape) -> Result<Cells> {
+fn rank_cells(shape: &Shape, run: &RunContext) -> Result<Cells> {
     let FacetSet { mesh, facets, dual } = FacetSet::of(shape)?;
     let facet_value = facet_values(shape, &facets)?;
     let contacts = mesh.contacts.as_ref().expect("a Voronoi medial mesh has contacts");
@@ -179,6 +182,7 @@ fn rank_cells(shape: &Shape) -> Result<Cells> {
             (shared.len() >= 3).then(|| (ends, enclosing_radius(contacts, &shared)))
         })
         .collect();
+    run.check()?;
     let (edges, mut edge_value): (Vec<[u32; 2]>, Vec<f64>) = found.into_iter().unzip();
     let mut vertex_value: Vec<f64> =
         contacts.of_sphere.par_iter().map(|ids| enclosing_radius(contacts, ids)).collect();

@@ -105,8 +105,9 @@ pub fn method() -> Method<DeyZhaoParams> {
 fn prepare<'s>(shape: &'s Shape, params: DeyZhaoParams, run: &RunContext) -> Prepared<'s> {
     let params = params.validate()?;
     FacetSet::refuse_given(shape)?;
+    let run_again = run.clone();
     Ok(Box::new(BySamples::new(shape, PUBLISHED, run, move |shape| {
-        Ok(Box::new(selection(shape, params)?))
+        Ok(Box::new(selection(shape, params, &run_again)?))
     })?))
 }
 
@@ -123,10 +124,16 @@ fn scale() -> Scale {
 }
 
 /// Steps 1 to 3 on the samples of a shape.
-fn selection(shape: &Shape, params: DeyZhaoParams) -> Result<RankedFacets<'static>> {
+fn selection(
+    shape: &Shape,
+    params: DeyZhaoParams,
+    run: &RunContext,
+) -> Result<RankedFacets<'static>> {
     let set = FacetSet::of(shape)?;
+    run.check()?;
     let delaunay = shape.delaunay()?;
     let umbrellas = Umbrellas::new(&delaunay, shape.cells()?.circumspheres());
+    run.check()?;
     let mut diagnostics = Diagnostics::default();
     diagnostics.count("samples_without_umbrella", umbrellas.missing());
     diagnostics.count("umbrella_triangles_without_area", umbrellas.flat());

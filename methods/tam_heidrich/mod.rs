@@ -264,35 +264,27 @@ medial::parameters! {
         /// full number.
         drop: f64 = 0.25, "share";
         /// The later rounds remove parts of at most this volume, as far as the topology allows.
-        t_v: List<f64> = List(vec![1.0, 1.0]), "per cent of the solid's volume, one for each round";
+        t_v: List = List(vec![1.0, 1.0]), "per cent of the solid's volume, one for each round";
     }
 }
 
 /// Numbers, written as one number, as `1,5`, or as a JSON array.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Written<T>", into = "Vec<T>")]
-#[serde(bound(
-    serialize = "T: Clone + Serialize",
-    deserialize = "T: Deserialize<'de> + std::str::FromStr, T::Err: std::fmt::Display"
-))]
-pub struct List<T>(pub Vec<T>);
+#[serde(try_from = "Written", into = "Vec<f64>")]
+pub struct List(pub Vec<f64>);
 
 #[derive(Deserialize)]
 #[serde(untagged, expecting = "expected a number, numbers separated by commas, or an array")]
-enum Written<T> {
-    One(T),
-    Many(Vec<T>),
+enum Written {
+    One(f64),
+    Many(Vec<f64>),
     Text(String),
 }
 
-impl<T> TryFrom<Written<T>> for List<T>
-where
-    T: std::str::FromStr,
-    T::Err: std::fmt::Display,
-{
+impl TryFrom<Written> for List {
     type Error = String;
 
-    fn try_from(written: Written<T>) -> Result<Self, String> {
+    fn try_from(written: Written) -> Result<Self, String> {
         Ok(Self(match written {
             Written::One(number) => vec![number],
             Written::Many(numbers) => numbers,
@@ -305,8 +297,8 @@ where
     }
 }
 
-impl<T> From<List<T>> for Vec<T> {
-    fn from(list: List<T>) -> Self {
+impl From<List> for Vec<f64> {
+    fn from(list: List) -> Self {
         list.0
     }
 }

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use super::block_cholesky::{Block, add_product, backward, cholesky, forward};
 use super::descent::{Descent, LEAST_RADIUS};
-use super::goal::{Goal, uncovered, vertices};
+use super::goal::{DEEP, Goal, uncovered, vertices};
 use super::guard::Sheets;
 use crate::Result;
 
@@ -184,8 +184,7 @@ impl<'a> Stars<'a> {
             face.iter().for_each(|&v| this.faces[v as usize].push(f));
         }
         let surface = points.samples.iter().map(|s| (s.point, s.weight, -1.0));
-        let interior =
-            points.interior.iter().map(|x| (x.point, x.weight, x.depth.min(points.deep)));
+        let interior = points.interior.iter().map(|x| (x.point, x.weight, x.depth.min(DEEP)));
         for ((point, weight, depth), found) in surface.chain(interior).zip(&residuals.nearest) {
             let mut served = Served { point, weight, depth, now: 0.0 };
             served.now = served.error(found.signed).powi(POWER);
@@ -453,7 +452,7 @@ impl Ring {
         let (mut sum, mut known) = (0.0, None);
         for ball in balls {
             let enough = ball.radius - small;
-            let Some(depth) = goal.depth_of_moved(ball.centre, enough, 0.0, &mut known) else {
+            let Some(depth) = goal.depth_of_moved(ball.centre, enough, &mut known) else {
                 continue;
             };
             sum += PROTRUDING * (ball.radius - depth.value).max(0.0).powi(POWER);

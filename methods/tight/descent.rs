@@ -236,11 +236,11 @@ impl<'a> Descent<'a> {
     /// # Errors
     /// When the mesh has no union.
     pub fn join_new_of(&mut self, others: &Points) -> Result<()> {
-        let Points { samples, interior, outside, deep } = &self.points;
+        let Points { samples, interior, outside } = &self.points;
         let samples = others.samples[samples.len()..].to_vec();
         let interior = others.interior[interior.len()..].to_vec();
         let outside = others.outside[outside.len()..].to_vec();
-        self.join(Points { samples, interior, outside, deep: *deep })
+        self.join(Points { samples, interior, outside })
     }
 
     /// The largest error of a residual.

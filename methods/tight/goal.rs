@@ -90,8 +90,6 @@ pub(super) struct Points {
     pub interior: Vec<Interior>,
     /// Places outside that a union reached: balls there are watched for protruding.
     pub outside: Vec<Vec3>,
-    /// Depth from which on an uncovered interior point counts alike.
-    pub deep: f64,
 }
 
 impl Points {
@@ -104,7 +102,7 @@ impl Points {
     /// The signed distance at which an interior point is held well enough, by its place among all.
     pub fn enough(&self, i: usize) -> Option<f64> {
         let i = i.checked_sub(self.samples.len())?;
-        Some(held_from(self.interior[i].depth.min(self.deep)))
+        Some(held_from(self.interior[i].depth.min(DEEP)))
     }
 }
 
@@ -171,7 +169,7 @@ impl Goal {
         // Along a curve: the primitive of a sample mostly serves the next one.
         let places: Vec<Vec3> = samples.iter().map(|sample| sample.point).collect();
         let samples = morton_order(&places).into_iter().map(|(_, i)| samples[i as usize]).collect();
-        Points { samples, interior, outside: Vec::new(), deep: DEEP }
+        Points { samples, interior, outside: Vec::new() }
     }
 
     /// A search for the largest errors of a medial mesh.
@@ -214,17 +212,10 @@ impl Goal {
     ///
     /// Depths are 1-Lipschitz, so a place that moved less than its depth is on the same side, and one
     /// that is still deeper than `enough` needs no query: `None`.
-    /// Where a query is needed it looks farther than `enough` by `margin` times the way, to spare the next one.
-    pub fn depth_of_moved(
-        &self,
-        p: Vec3,
-        enough: f64,
-        margin: f64,
-        known: &mut Option<Known>,
-    ) -> Option<Depth> {
-        let (mut side, mut moved) = (None, 0.0);
+    pub fn depth_of_moved(&self, p: Vec3, enough: f64, known: &mut Option<Known>) -> Option<Depth> {
+        let mut side = None;
         if let Some(known) = known {
-            moved = p.distance(known.point);
+            let moved = p.distance(known.point);
             if known.depth - moved >= enough {
                 return None;
             }
@@ -239,15 +230,14 @@ impl Goal {
         let side = side.unwrap_or_else(|| self.inside.side(p));
         let face = known.map(|known| known.face);
         // Inside only faces within `enough` matter.
-        let beyond = enough + margin * moved;
         let closest = match side {
-            Side::Inside if beyond > 0.0 => self.tree.closest_within_from(p, beyond, face),
+            Side::Inside if enough > 0.0 => self.tree.closest_within_from(p, enough, face),
             _ => Some(self.tree.closest_from(p, face)),
         };
         let exact = closest.map(|closest| self.signed(p, &closest, side));
         *known = Some(Known {
             point: p,
-            depth: exact.map_or(beyond, |exact| exact.value),
+            depth: exact.map_or(enough, |exact| exact.value),
             face: closest.map_or(face.unwrap_or(0), |closest| closest.face),
             exact,
         });
@@ -371,7 +361,7 @@ pub(super) fn refused(error: MetricError) -> SimplifyError {
 // `d sigma / d c_j = -a_j u`, `d sigma / d r_j = -a_j`. The weights `a` may be held, because `sigma` is a
 // minimum over them (the envelope theorem).
 
-/// Depth from which on uncovered interior points count alike before the rounds, a fraction of the
+/// Depth from which on uncovered interior points count alike, a fraction of the
 /// diagonal.
 pub(super) const DEEP: f64 = 0.02;
 
@@ -381,9 +371,6 @@ const PROTRUDING: f64 = 0.3;
 /// Points of the medial mesh at which balls are watched for protruding. Twice as many gave the same
 /// errors.
 const HELD: usize = 1_500;
-
-/// Additional range of a search for the depth of a ball, in its last movements. Spares the next search.
-const FARTHER: f64 = 0.5;
 
 /// Fractional part of the golden ratio: offset of the sequence of points on a face.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -673,7 +660,7 @@ pub(super) fn residuals(
             Some(&Sample { point, weight }) => (point, weight, signed, 1.0),
             None => {
                 let Interior { point, depth, weight } = points.interior[i - count];
-                (point, weight, uncovered(depth.min(points.deep), signed), slope(signed))
+                (point, weight, uncovered(depth.min(DEEP), signed), slope(signed))
             }
         };
         if i >= count && error <= 0.0 {
@@ -700,7 +687,7 @@ pub(super) fn residuals(
     let protruding = held.par_iter_mut().map(|held| {
         let ball = interpolated(mesh, held);
         let enough = ball.radius - tolerance;
-        let depth = goal.depth_of_moved(ball.centre, enough, FARTHER, &mut held.known)?;
+        let depth = goal.depth_of_moved(ball.centre, enough, &mut held.known)?;
         let [x, y, z] = depth.gradient.to_array();
         let Held { primitive, weights, .. } = *held;
         Some(Row {

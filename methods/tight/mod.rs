@@ -17,7 +17,7 @@
 //!    largest errors join the samples after each pass, and after each swap of 5.
 //! 5. *Swap* (`swap.rs`): spheres are inserted where the error is largest, and as many edges collapsed
 //!    where it hurts least. Only the spheres around them move then (`settle`).
-//! 6. *Rounds* (this file, `witnesses.rs`): steps of 3 at powers up to 32, between which the largest errors, found by
+//! 6. *Rounds* (this file, `witnesses.rs`): steps of 3 at the power 32, between which the largest errors, found by
 //!    local ascent and a sweep of both sides, join the samples, and balls are watched where the union came out of the solid;
 //!    then swaps as in 5, each with a second chance, and rounds again. The state
 //!    with the least measured error is the result.
@@ -61,7 +61,7 @@ use std::ops::Bound;
 use std::sync::Arc;
 
 use descent::{Descent, Objective};
-use goal::{DEEP, Goal, Points};
+use goal::{Goal, Points};
 use medial::complex::{MedialMesh, betti, crossing_faces};
 use medial::metrics::topology_warning;
 use medial::shape::Shape;
@@ -387,8 +387,8 @@ impl Start {
 // Step 6: higher and higher powers, with witnesses of the largest errors joining in between.
 //
 // 1. Steps at the powers 4 and 8.
-// 2. Rounds: the places of the largest errors join the samples as witnesses, then steps at the power 16
-//    or 32 plus `lambda` times the mean.
+// 2. Rounds: the places of the largest errors join the samples as witnesses, then steps at the power 32
+//    plus `lambda` times the mean.
 // 3. Swaps of a few spheres, and later of one, from the best state so far. Only the spheres around them move at
 //    first; where that lowers the sum of the powers all spheres take a step, and the error is measured. If it is
 //    little larger than before, its places join as witnesses, and a few more steps follow: without this, most swaps
@@ -400,18 +400,14 @@ impl Start {
 /// Powers and steps before the first round.
 const WARM: [(i32, usize); 2] = [(4, 9), (8, 14)];
 
-/// Power of the first two rounds, and of all others.
-const POWERS: [i32; 2] = [16, 32];
+/// Power of the rounds and of the swaps between them.
+const ROUND_POWER: i32 = 32;
 
 /// Steps of the descent in a round.
 const ROUND_STEPS: usize = 8;
 
 /// Share by which a round or a swap has to lower the error to count as a gain.
 const GAIN: f64 = 0.01;
-
-/// Limit of the error that scales the objective of a round, in least errors so far. Above it the steps
-/// would be too timid.
-const WORSE: f64 = 1.15;
 
 /// Consecutive rounds without a gain that are accepted.
 const PATIENCE: usize = 2;
@@ -424,21 +420,10 @@ const MAX_FAILURES: usize = 6;
 /// Spheres for each sphere that the first swap replaces. Later swaps replace fewer, and then one.
 const FIRST_SHARE: usize = 25;
 
-/// Factor of the objective above which a swap is given up before all spheres take steps.
-const HOPELESS: f64 = 2.0;
-
 /// Steps of all spheres after a swap, and further ones if its error is below [`CHANCE`].
 const SWAP_STEPS: [usize; 2] = [1, 4];
 /// Limit of the error of a swap for further steps, in least errors so far.
 const CHANCE: f64 = 1.6;
-
-/// Limit of the error of a swap that is kept for its objective, in least errors so far.
-const EQUAL: f64 = 1.002;
-/// Factor of the objective below which such a swap is kept.
-const LOWER: f64 = 0.97;
-
-/// Depth from which on uncovered interior points count alike, in errors.
-const DEEPER: f64 = 3.0;
 
 /// The last rounds on one goal.
 struct Polish<'a> {
@@ -488,8 +473,7 @@ impl<'a> Polish<'a> {
     }
 
     /// A descent from a state.
-    fn at(&self, state: &State, mut points: Points) -> Result<Descent<'a>> {
-        points.deep = DEEP.min(DEEPER * state.error);
+    fn at(&self, state: &State, points: Points) -> Result<Descent<'a>> {
         Descent::new(self.goal, points, state.mesh.clone())
     }
 
@@ -503,9 +487,8 @@ impl<'a> Polish<'a> {
         let mut best = State { mesh: from.mesh, error };
         let mut descent = self.at(&best, from.points)?;
         let mut idle = 0;
-        for round in 0..self.params.rounds {
-            let power = POWERS[usize::from(round >= 2)];
-            let objective = self.objective(power, error.min(WORSE * best.error));
+        for _ in 0..self.params.rounds {
+            let objective = self.objective(error);
             descent.run(objective, ROUND_STEPS, self.run)?;
             error = witnesses.join(&mut descent, f64::INFINITY)?;
             idle = if error < (1.0 - GAIN) * best.error { 0 } else { idle + 1 };
@@ -529,7 +512,7 @@ impl<'a> Polish<'a> {
         let mut each = (best.mesh.spheres.len() / FIRST_SHARE).max(1);
         let (mut skipped, mut idle, mut helped) = (0, 0, 0);
         for _ in 0..MAX_SWAPS {
-            let objective = self.objective(POWERS[1], best.error);
+            let objective = self.objective(best.error);
             let trial = swapped(&from, each, skipped, self.run)?;
             let mut error = f64::INFINITY;
             let mut is_kept = false;
@@ -538,11 +521,7 @@ impl<'a> Polish<'a> {
                 is_kept = error < best.error;
                 if !is_kept {
                     from.join_new_of(&trial.points)?;
-                    // The largest error is at another place, which is next.
-                    is_kept = error <= EQUAL * best.error
-                        && trial.value(&objective) < LOWER * from.value(&objective);
-                }
-                if is_kept {
+                } else {
                     from = trial;
                 }
             }
@@ -580,14 +559,11 @@ impl<'a> Polish<'a> {
         least: f64,
         witnesses: &mut Witnesses<'_>,
     ) -> Result<f64> {
-        let objective = self.objective(POWERS[1], least);
-        // A value that is not a number is not below.
-        let is_below = |trial: &Descent<'_>, times: f64| trial.value(&objective) < times * value;
-        if !is_below(trial, HOPELESS) {
-            return Ok(f64::INFINITY);
-        }
+        let objective = self.objective(least);
         trial.run(objective, SWAP_STEPS[0], self.run)?;
-        if !is_below(trial, 1.0) {
+        // A value that is not a number is not below.
+        let is_below = trial.value(&objective) < value;
+        if !is_below {
             return Ok(f64::INFINITY);
         }
         let mut error = witnesses.join(trial, least)?;
@@ -599,8 +575,8 @@ impl<'a> Polish<'a> {
     }
 
     /// A little below the error counts as one, so that larger ones weigh heavily.
-    fn objective(&self, power: i32, error: f64) -> Objective {
-        Objective { power, mean: self.params.lambda, scale: 0.9 * error }
+    fn objective(&self, error: f64) -> Objective {
+        Objective { power: ROUND_POWER, mean: self.params.lambda, scale: 0.9 * error }
     }
 }
 

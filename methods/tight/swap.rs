@@ -257,7 +257,7 @@ fn nearby(
     let (lo, hi) = part.bounding_box();
     let is_near = |p: Vec3| (p - lo).min_element() > 0.0 && (hi - p).min_element() > 0.0;
     let outside = all.outside.iter().copied().filter(|&p| is_near(p)).collect();
-    let mut points = Points { outside, deep: all.deep, ..Points::default() };
+    let mut points = Points { outside, ..Points::default() };
     let places: Vec<Vec3> = all.places().collect();
     let staying = nearest.iter().map(|found| kept.of(found.primitive).map(|_| found.signed));
     let staying: Vec<Option<f64>> = staying.collect();

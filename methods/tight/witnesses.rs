@@ -8,7 +8,9 @@ use medial::Vec3;
 use medial::metrics::PeakSearch;
 
 use super::descent::Descent;
-use super::goal::{ASIDE, Goal, Interior, Points, Sample, held_from, refused, uncovered, union_of};
+use super::goal::{
+    ASIDE, DEEP, Goal, Interior, Points, Sample, held_from, refused, uncovered, union_of,
+};
 use crate::Result;
 
 /// Share of the largest error above which errors are witnesses.
@@ -44,10 +46,9 @@ impl<'a> Witnesses<'a> {
     /// When the mesh has no union.
     pub fn join(&mut self, descent: &mut Descent<'_>, swept_below: f64) -> Result<f64> {
         let Self { goal, search, .. } = self;
-        let deep = descent.points.deep;
         let peaks = search.of(&descent.mesh, swept_below).map_err(refused)?;
         let pool: Vec<Vec3> = goal.pool.iter().map(|inside| inside.point).collect();
-        let enough = |i: usize| Some(held_from(goal.pool[i].depth.min(deep)));
+        let enough = |i: usize| Some(held_from(goal.pool[i].depth.min(DEEP)));
         let nearest = union_of(&descent.mesh)?.deepest_batch_near(&pool, &[], enough);
         let signed: Vec<f64> = nearest.iter().map(|nearest| nearest.signed).collect();
         // The union's boundary at a distance `sigma` from a point that it does not hold is as deep as that
@@ -60,7 +61,7 @@ impl<'a> Witnesses<'a> {
             large.map(|peak| peak.point).collect()
         });
         let mut gaps: Vec<(f64, Vec3)> = (self.goal.pool.iter().zip(&signed))
-            .map(|(inside, &signed)| (uncovered(inside.depth.min(deep), signed), inside.point))
+            .map(|(inside, &signed)| (uncovered(inside.depth.min(DEEP), signed), inside.point))
             .filter(|&(gap, _)| gap > WITNESS * error)
             .collect();
         gaps.sort_by(|x, y| y.0.total_cmp(&x.0));
@@ -76,7 +77,7 @@ impl<'a> Witnesses<'a> {
         let places = places.map(|((point, depth), weight)| Interior { point, depth, weight });
         let (interior, outside): (Vec<_>, Vec<_>) = places.partition(|place| place.depth > 0.0);
         let outside = outside.into_iter().map(|place| place.point).collect();
-        descent.join(Points { samples, interior, outside, deep })?;
+        descent.join(Points { samples, interior, outside })?;
         Ok(error)
     }
 

@@ -1,8 +1,6 @@
 //! Average outward flux: closed forms, known axes, topology, losses, the published level, refusals.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use medial::Vec3;
 use medial::complex::{betti, cubical_betti};
@@ -400,31 +398,5 @@ fn bad_input_is_refused_by_name() {
     for height in [1e-6, 1e-3] {
         let refused = simplified(&shape_of(&cuboid(Vec3::new(1.0, 1.0, height))), "", count);
         assert!(matches!(refused, Err(SimplifyError::Parameter(_))), "{height}");
-    }
-}
-
-/// Every stage reports progress: a run that is cancelled at any report ends there.
-#[test]
-fn cancelling_ends_the_run_at_every_stage() {
-    let shape = default_shape("torus");
-    // Cancels after a number of reports; the outcome, and the number of all reports.
-    let cancelled_after = |limit: usize| {
-        let (run, reports) = (RunContext::default(), Arc::new(AtomicUsize::new(0)));
-        let (flag, counted) = (run.cancel_flag(), Arc::clone(&reports));
-        let run = run.on_progress(move |progress| {
-            assert!(progress.done <= progress.total, "{progress:?}");
-            flag.store(counted.fetch_add(1, Relaxed) >= limit, Relaxed);
-        });
-        let prepared = aof::method().prepare(&shape, &settings(&[]), &run);
-        let outcome = prepared.and_then(|mut prepared| prepared.at(Level::Native(30.0)));
-        (outcome, reports.load(Relaxed))
-    };
-    let (outcome, all) = cancelled_after(usize::MAX);
-    assert!(outcome.is_ok() && all > 5, "{all}");
-    for k in (0..all).step_by(1 + all / 12).chain([all - 1]) {
-        let (outcome, reports) = cancelled_after(k);
-        assert!(matches!(outcome.err(), Some(SimplifyError::Cancelled)), "{k} of {all}");
-        // Those that other threads were about to make.
-        assert!(reports <= k + 1 + rayon::current_num_threads(), "{reports} after {k}");
     }
 }

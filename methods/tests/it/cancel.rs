@@ -13,7 +13,7 @@ const PROMPT: Duration = Duration::from_secs(5);
 
 /// A shape on which methods take long, with the substrates that no flag interrupts.
 fn large_shape() -> Shape {
-    let mesh = medial_datasets::find("blob").expect("in the catalogue").mesh(160);
+    let mesh = medial_datasets::find("blob").expect("in the catalogue").mesh(96);
     let report = surface::validate(&mesh).expect("a solid");
     let shape = Shape::new("blob", &mesh, report, ShapeOptions::default()).expect("an extent");
     shape.initial().expect("an initial medial mesh");
@@ -31,7 +31,7 @@ fn every_method_ends_soon_after_it_is_cancelled() {
     for entry in medial_methods::registry() {
         let id = entry.method.info().id.to_string();
         // At once, and in later phases.
-        for delay in [0, 300, 1500].map(Duration::from_millis) {
+        for delay in [0, 500].map(Duration::from_millis) {
             let run = RunContext::default();
             let flag = run.cancel_flag();
             let is_done = AtomicBool::new(false);
@@ -61,5 +61,5 @@ fn every_method_ends_soon_after_it_is_cancelled() {
         }
     }
     cancelled.dedup();
-    assert!(cancelled.len() > 8, "{cancelled:?}");
+    assert_eq!(cancelled.len(), medial_methods::registry().len(), "{cancelled:?}");
 }
