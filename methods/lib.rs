@@ -191,6 +191,14 @@ fn references(keys: &[&str]) -> String {
     found.join("\n")
 }
 
+/// A built-in solid, for unit tests.
+#[cfg(test)]
+fn test_shape(id: &str, resolution: u32) -> medial::shape::Shape {
+    let mesh = medial_datasets::find(id).expect("in the catalogue").mesh(resolution);
+    let report = medial::surface::validate(&mesh).expect("a solid");
+    medial::shape::Shape::new(id, &mesh, report, Default::default()).expect("an extent")
+}
+
 #[cfg(test)]
 mod tests {
     use std::fs;

@@ -316,10 +316,7 @@ mod tests {
 
     #[test]
     fn only_the_lattice_of_the_requested_level_is_made() {
-        let mesh = medial_datasets::find("plate").expect("in the catalogue").mesh(8);
-        let report = medial::surface::validate(&mesh).expect("a solid");
-        let shape = Shape::new("plate", &mesh, report, medial::shape::ShapeOptions::default());
-        let shape = shape.expect("an extent");
+        let shape = crate::test_shape("plate", 8);
         let params = AofParams { resolution: Resolution::Voxels(40) };
         let mut prepared = PreparedAof::new(&shape, params, &RunContext::default()).expect("valid");
         prepared.at(Level::Published).expect("published");

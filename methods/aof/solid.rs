@@ -667,10 +667,7 @@ mod tests {
 
     #[test]
     fn lattices_beyond_memory_are_lowered_where_free_and_refused_elsewhere() {
-        let mesh = medial_datasets::find("box").expect("in the catalogue").mesh(8);
-        let report = medial::surface::validate(&mesh).expect("a solid");
-        let shape = Shape::new("box", &mesh, report, medial::shape::ShapeOptions::default());
-        let shape = shape.expect("an extent");
+        let shape = crate::test_shape("box", 8);
         let solid = |resolution, max_megabytes| {
             let setting = LatticeSetting { max_megabytes, ..LatticeSetting::published(resolution) };
             Solid::new(&shape, setting, RunContext::default()).expect("faces")

@@ -146,24 +146,6 @@ fn an_exact_cover_is_the_smallest() {
 }
 
 #[test]
-fn an_exact_cover_has_no_more_balls_than_a_greedy_one() {
-    let mut rng = Pcg64::seed_from_u64(4);
-    for round in 0..6 {
-        let samples = random_points(&mut rng, 120);
-        let balls = random_balls(&mut rng, 60 + 20 * round);
-        let coverage = Coverage::new(&samples, &balls, 0.02);
-        let cover = exact_cover(&coverage);
-        assert_covers(&coverage, &cover.chosen);
-        let greedy = choose(&balls, &coverage, 1000).chosen.len();
-        let reduced = exact::reduce(&coverage, &RunContext::default()).unwrap();
-        let largest = exact::largest_first(&reduced).len() + reduced.forced.len();
-        let fewest = cover.chosen.len();
-        assert_eq!(cover.bound, fewest);
-        assert!(fewest <= greedy && fewest <= largest, "{fewest}, {greedy}, {largest}");
-    }
-}
-
-#[test]
 fn a_cylinder_takes_as_many_as_their_rings_are_wide() {
     let (radius, length) = (0.2, 3.0);
     // By the golden ratio.

@@ -2,16 +2,9 @@
 
 use medial::Vec3;
 use medial::geometry::{CellId, Delaunay, Pole, Poles, VertexId};
-use medial::shape::ShapeOptions;
-use medial::surface;
 
 use super::*;
-
-fn shape_of(id: &str, resolution: u32) -> Shape {
-    let mesh = medial_datasets::find(id).unwrap().mesh(resolution);
-    let report = surface::validate(&mesh).unwrap();
-    Shape::new(id, &mesh, report, ShapeOptions::default()).unwrap()
-}
+use crate::test_shape;
 
 /// Of each sample the other corners of its umbrella's triangles: the dual edges that have their ends on
 /// both sides of the plane through the sample normal to its pole vector.
@@ -51,7 +44,7 @@ fn expected_umbrellas(delaunay: &Delaunay) -> Vec<Vec<[VertexId; 2]>> {
 
 #[test]
 fn umbrellas_are_the_triangles_whose_dual_edge_crosses_the_tangent_plane() {
-    let shape = shape_of("blob", 24);
+    let shape = test_shape("blob", 24);
     let delaunay = shape.delaunay().unwrap();
     let umbrellas = Umbrellas::new(&delaunay, shape.cells().unwrap().circumspheres());
     assert_eq!((umbrellas.missing(), umbrellas.flat()), (0, 0));
@@ -76,7 +69,7 @@ fn umbrellas_are_the_triangles_whose_dual_edge_crosses_the_tangent_plane() {
 #[test]
 fn a_facet_is_above_a_level_if_its_value_is() {
     for id in ["blob", "box"] {
-        let shape = shape_of(id, 20);
+        let shape = test_shape(id, 20);
         let delaunay = shape.delaunay().unwrap();
         let facets = FacetSet::of(&shape).unwrap().facets;
         // The paper's thresholds, weak ones, which edges of umbrellas would pass, and each condition alone.

@@ -47,16 +47,13 @@
 //! runs deep inside the solid although every sample is near some primitive.
 //!
 //! With `inside=depth` the initial mesh often exceeds a small bound: the cones and slabs of a
-//! Voronoi medial mesh stick out of the surface between the spheres, by 0.63 % of the diagonal on the
-//! bear and 0.51 % on the dolphin. The code's default of `1e-4` presumes `inside=surface`, for which
-//! the initial mesh has no error at all. [`Level::Published`] is the code's rule: it stops before the
-//! first collapse whose local error exceeds `1e-4`. It guarantees no bound, and reports the error of
-//! the result.
+//! Voronoi medial mesh stick out of the surface between the spheres. The code's default of `1e-4` presumes
+//! `inside=surface`, for which the initial mesh has no error at all. [`Level::Published`] is the code's rule:
+//! it stops before the first collapse whose local error exceeds `1e-4`. It guarantees no bound, and reports
+//! the error of the result.
 //!
 //! The error can rise with the number of spheres. A primitive of the start that sticks out of the surface
-//! makes every collapse next to it expensive, so it stays until late: on the built-in torus the start and
-//! the result at 1,000 spheres share a two-sided error of 2.4 % at one place, and at 100 spheres, when that
-//! place is collapsed, 0.5 % is left. A start without such places has no such rise.
+//! makes every collapse next to it expensive, so it stays until late.
 //!
 //! # Laziness
 //!
@@ -76,9 +73,7 @@
 //! # Deviations from the papers
 //!
 //! - The default is `inside=depth`. `surface` hardly notices that a primitive swallows a sample, since
-//!   buried surfaces of other primitives are near it. Largest `|sigma|` at 100 spheres, over the
-//!   vertices and 50,000 more points: bear 0.65 % of the diagonal with `depth`, 4.5 % with
-//!   `surface`; dolphin 0.41 % and 1.3 %. Largest `mu`: 0.65 % and 1.1 %, 0.41 % and 0.40 %.
+//!   buried surfaces of other primitives are near it.
 //! - The authors' code requires that an edge has as many faces as its ends have common neighbours.
 //!   Here a collapse must keep the homotopy type ([`CollapseComplex::keeps_homotopy`]). The full link
 //!   condition would reject more: edges that close a hole and the void in it at once, which does not
@@ -93,12 +88,9 @@
 //! first half of the claim holds on all three models, the second on none: HEM stays below Q-MAT at
 //! 100 and at 50 spheres.
 //!
-//! On two of the three the reason is the condition that blocks collapses. With the condition of the
-//! authors' code the result agrees with the paper: the bear has 1.8 % at 100 spheres, where
-//! Q-MAT as published has 1.1 % (`topology_from=200`) and the homotopy test 0.65 %, and stops at 77;
-//! the dolphin stops at 152, at 14 %. Edges around pockets of spheres close a hole and the void in it
-//! at once, so that condition rejects them for good. On the stand-in for the octopus HEM stays below
-//! Q-MAT even so, for a reason that is not known.
+//! On two of the three the reason is the condition that blocks collapses: an earlier build with that of the
+//! authors' code agreed with the paper. Edges around pockets of spheres close a hole and the void in it at
+//! once, so that condition rejects them for good.
 //!
 //! [`CollapseComplex::keeps_homotopy`]: medial::complex::collapse::CollapseComplex::keeps_homotopy
 

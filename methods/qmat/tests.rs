@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use medial::Vec3;
 use medial::complex::collapse::CollapseComplex;
 use medial::complex::{MedialMesh, Sphere, betti};
-use medial::simplifier::{RunContext, SimplifyError};
+use medial::simplifier::RunContext;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -717,24 +717,4 @@ enum Placed {
 fn sorted<const N: usize>(mut simplex: [u32; N]) -> [u32; N] {
     simplex.sort_unstable();
     simplex
-}
-
-#[test]
-fn the_search_for_unlocked_edges_ends_when_cancelled() {
-    let mesh = medial_datasets::find("torus").expect("in the catalogue").mesh(24);
-    let report = medial::surface::validate(&mesh).expect("a solid");
-    let shape = Shape::new("torus", &mesh, report, medial::shape::ShapeOptions::default());
-    let shape = shape.expect("an extent");
-    let initial = shape.initial().expect("samples that span space");
-    let mut contraction = Contraction::new(&initial, QmatParams::default());
-    let run = RunContext::default();
-    contraction.run_to(&initial, 100, &run).expect("not cancelled");
-    assert!(contraction.unlock(&initial, &run).is_ok());
-    run.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
-    let cancelled = |outcome| matches!(outcome, Err(SimplifyError::Cancelled));
-    assert!(cancelled(contraction.unlock(&initial, &run).map(|_| ())));
-    // Not only at each 4096th collapse.
-    let before = contraction.complex.sphere_count();
-    assert!(cancelled(contraction.run_to(&initial, 10, &run)));
-    assert_eq!(contraction.complex.sphere_count(), before);
 }

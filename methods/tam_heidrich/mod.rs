@@ -27,24 +27,18 @@
 //! step. The diagnostics name the count on the other side of the number.
 //!
 //! # Results that do not reproduce
-//! - On an exact axis of a box there are twelve parts of level 1 and one of level 2, as in figure 5, and
-//!   so there are on a box that is sampled on a grid (the built-in one): 161 parts at first, these 13
-//!   after one round by triangle count. On the same box with 3,000 samples of blue noise there are not:
-//!   neighbouring polar balls often share no sample, so that their union has dimples, and its exact axis
-//!   has 12,800 parts. The rounds by triangle count leave 68, but where one of the small parts ended at
-//!   a seam, that has an edge of two triangles, and sheets grow together over it, by the rule of section
-//!   4.1.
-//! - Rounds without a test of topology are not harmless: on the built-in double torus they cut both
-//!   loops, on the bear with 35,000 samples of blue noise they leave 18 components.
+//! - On an exact axis of a box, and on one that is sampled on a grid, there are twelve parts of level 1 and
+//!   one of level 2, as in figure 5. With samples of blue noise there are not: neighbouring polar balls often
+//!   share no sample, so that their union has dimples. Where one of the small parts ended at a seam, that
+//!   has an edge of two triangles, and sheets grow together over it, by the rule of section 4.1.
+//! - Rounds without a test of topology are not harmless: they can cut loops and split components.
 //! - Pruning ends where all that is left is one sheet for each body, or sheets that hold loops, often
 //!   far above the requested number of spheres. The paper reports the same of the bunny's feet.
-//!
 //! - *The seed.* Moved balls make no loops: the axis of a solid has the same Betti numbers for every seed.
 //!   They do decide which small parts there are, hence which sheets grow together when these go, and which
-//!   single sheet is left in the end. Moved by `1e-4 r`, a twentieth of their growth, the balls of the
-//!   screwdriver end at 126 to 4,594 spheres, by the seed (0 to 9); moved by `1e-7 r` at 4,427 to 4,707. So
-//!   this is the default; a tenth of it tears the axis of a sampled frame, whose balls are in special position.
-//!   Other samples of the same surface still end elsewhere: that is the rule of section 4.1.
+//!   single sheet is left in the end. Moved by `1e-4 r` results differ widely by the seed, moved by `1e-7 r`
+//!   little; a tenth of that tears the axis of balls in special position. Other samples of the same surface
+//!   still end elsewhere: that is the rule of section 4.1.
 //!
 //! # Deviations from the paper
 //! - *The test of topology.* The paper keeps a part that lies on a cycle of its graph of parts and

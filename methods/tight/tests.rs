@@ -13,12 +13,7 @@ use super::descent::{Descent, Objective};
 use super::goal::{Goal, Row, vertices};
 use super::guard::{Guard, Sheets, Still};
 use super::swap::{settle, swapped};
-
-fn shape(id: &str, resolution: u32) -> Shape {
-    let mesh = medial_datasets::find(id).expect("in the catalogue").mesh(resolution);
-    let report = medial::surface::validate(&mesh).expect("built-in shapes are solids");
-    Shape::new(id, &mesh, report, ShapeOptions::default()).expect("an extent")
-}
+use crate::test_shape as shape;
 
 /// Parameters that are good enough for simple shapes, and quick.
 fn quick() -> Params {
@@ -278,18 +273,6 @@ fn a_bound_is_held_by_the_judge_and_with_fewer_spheres_if_it_is_wider() {
         let found = levels.at(Level::Native(nonsense));
         assert!(matches!(found, Err(SimplifyError::Level(_))), "{nonsense}");
     }
-}
-
-/// The error of a flat solid falls in a step from a few per cent to almost none, which no interpolation foretells.
-#[test]
-fn a_bound_of_a_flat_solid_takes_few_spheres() {
-    let shape = shape("bracket", 30);
-    let mut params = quick();
-    params.set("samples", "1000");
-    let tight = crate::find("tight").unwrap();
-    let mut levels = tight.prepare(&shape, &params, &RunContext::default()).unwrap();
-    let found = levels.at(Level::Native(0.01)).unwrap();
-    assert!(found.mesh.spheres.len() < 60, "{}", found.mesh.spheres.len());
 }
 
 #[test]

@@ -4,17 +4,14 @@ use std::f64::consts::PI;
 
 use medial::Vec3;
 use medial::complex::Sphere;
-use medial::simplifier::Diagnostics;
 use medial::surface::TriMesh;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::points::{Locality, Oriented, SurfacePoints};
 use super::refit::{Residuals, refit};
-use super::sampling::{
-    Clusters, Ended, Energy, Misfit, NONE, assign, drop_small, misfits, to_split,
-};
-use super::{edges, explain, triangles};
+use super::sampling::{Clusters, Energy, Misfit, NONE, assign, drop_small, misfits, to_split};
+use super::{edges, triangles};
 
 const ENERGY: Energy = Energy { lambda: 0.2 };
 
@@ -255,24 +252,5 @@ fn faces_are_cliques_of_spheres() {
             }
         }
         assert_eq!(triangles(&joined), cliques);
-    }
-}
-
-#[test]
-fn warnings_explain_fewer_spheres() {
-    for (requested, target, reached, ended, expected) in [
-        (10, 10, 10, Ended::AtRest, ""),
-        (10, 10, 8, Ended::Stalled, "8 spheres instead of 10: clusters"),
-        (10, 10, 8, Ended::IterationLimit, "8 spheres instead of 10: the limit of rounds"),
-        (10, 5, 5, Ended::AtRest, "5 spheres instead of 10: more than 5 need"),
-        (10, 10, 10, Ended::IterationLimit, "the error is not at rest"),
-    ] {
-        let mut diagnostics = Diagnostics::default();
-        explain(requested, target, reached, ended, &mut diagnostics);
-        let warnings = diagnostics.warnings.concat();
-        assert!(
-            warnings.contains(expected) && warnings.is_empty() == expected.is_empty(),
-            "{warnings}"
-        );
     }
 }

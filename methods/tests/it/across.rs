@@ -144,9 +144,10 @@ fn the_number_of_threads_changes_nothing() {
         ("vmas", &[]),
         ("vmas", &vertices),
         ("cover", &[]),
+        ("aof", &[("resolution", "50")]),
     ] {
         let [one, two] = [1, 2].map(|threads| {
-            let requested = [60, 10].map(Level::Spheres);
+            let requested = [Level::Spheres(60), Level::Spheres(10), Level::Published];
             let found = with_threads(threads, || levels(&shape_of(&mesh), method, set, &requested));
             let found = found.into_iter().map(|level| level.expect("a count"));
             found

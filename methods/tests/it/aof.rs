@@ -14,7 +14,7 @@ use medial_methods::aof::{
     Voxel, Wanted,
 };
 
-use crate::common::{self, cuboid, default_shape, params as settings, shape_of, with_threads};
+use crate::common::{self, cuboid, default_shape, params as settings, shape_of};
 
 fn own(shape: &Shape, resolution: u32) -> Solid<'_> {
     Solid::new(shape, LatticeSetting::own(resolution), RunContext::default()).expect("faces")
@@ -26,11 +26,6 @@ const HALF: Vec3 = Vec3::new(1.5, 1.0, 0.5);
 fn simplified(shape: &Shape, text: &str, level: Level) -> Result<Simplified> {
     let set: Vec<_> = text.split(' ').filter_map(|pair| pair.split_once('=')).collect();
     aof::method().prepare(shape, &settings(&set), &RunContext::default())?.at(level)
-}
-
-/// Everything that is written, to the last bit: numbers are printed with all their digits.
-fn all_of(result: &Simplified) -> String {
-    format!("{:?} {:?}", result.mesh, result.extras.get::<LatticeVoxels>())
 }
 
 /// Flux through a sphere of radius `sigma` in the box.
@@ -277,17 +272,6 @@ fn the_flux_of_a_convex_solid_is_the_sum_over_its_nearest_planes() {
             let expected = sphere.directions.iter().map(along).sum::<f64>() / 50.0;
             assert!((flux - expected).abs() < 1e-12, "{spiral:?} {centre}: {flux} {expected}");
         }
-    }
-}
-
-#[test]
-fn one_and_two_threads_give_the_same_bytes() {
-    let shape = default_shape("bracket");
-    for level in [Level::Native(25.0), Level::Spheres(150), Level::Published] {
-        let result = || all_of(&simplified(&shape, "resolution=50", level).expect("a result"));
-        let [one, two, three] = [1, 2, 3].map(|threads| with_threads(threads, result));
-        assert!(one.len() > 5000);
-        assert!(one == two && one == three, "{level:?}");
     }
 }
 

@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_8};
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::shape::Shape;
-use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
+use medial::simplifier::{Level, MedialSimplifier, RunContext, Simplified};
 use medial::surface::{Side, TriMesh};
 use medial_methods::dey_zhao;
 
@@ -54,23 +54,6 @@ fn a_plate_keeps_its_middle_sheet() {
     for s in kept.spheres.iter().filter(|s| (s.radius * unit - 0.05).abs() < 1e-3) {
         assert!(back(s.centre).z.abs() < 1e-3, "{:?}", back(s.centre));
     }
-}
-
-#[test]
-fn a_given_mesh_is_no_voronoi_diagram() {
-    let mesh = built_in("capsule", 36);
-    let shape = shape_of(&mesh, "vertices");
-    let given = MedialMesh::clone(&shape.initial().expect("an initial medial mesh"));
-    let shape = shape_of(&mesh, "vertices").with_initial(&given);
-    let refused = dey_zhao::method().prepare(&shape, &Params::none(), &RunContext::default());
-    assert!(matches!(refused, Err(SimplifyError::Unsupported { .. })));
-}
-
-#[test]
-fn more_samples_than_there_are_points_are_not_tried() {
-    let shape = shape_of(&built_in("capsule", 36), "vertices");
-    let many = at(&shape, &[], Level::Spheres(1_000_000_000));
-    assert!(many.diagnostics.warnings.iter().any(|w| w.contains("are not tried")));
 }
 
 #[test]

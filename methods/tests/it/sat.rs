@@ -46,15 +46,6 @@ fn scale_one_leaves_the_union_of_polar_balls() {
     }
 }
 
-#[test]
-fn scale_one_has_the_topology_of_the_solid() {
-    for id in ["sphere", "box", "capsule", "torus", "hollow-sphere", "blob", "bracket"] {
-        let shape = default_shape(id);
-        let result = at(&shape, Level::Native(1.0));
-        assert_eq!(Some(betti(&result.mesh)), shape.expected_betti(), "{id}");
-    }
-}
-
 /// A tube of radius `r` along the unit circle, open between the angles `-alpha` and `alpha`, with
 /// round ends.
 fn open_ring(alpha: f64, r: f64, n: u32) -> TriMesh {
@@ -150,12 +141,11 @@ fn all_built_in_shapes_have_valid_axes() {
             let result = at(&shape, Level::Native(scale));
             result.mesh.check().expect("a valid complex");
             assert!(!result.mesh.spheres.is_empty());
-            assert!(
-                result.diagnostics.warnings.is_empty(),
-                "{} {:?}",
-                built_in.id,
-                result.diagnostics
-            );
+            let (id, warnings) = (built_in.id, &result.diagnostics.warnings);
+            assert!(warnings.is_empty(), "{id} {warnings:?}");
+            if scale == 1.0 {
+                assert_eq!(Some(betti(&result.mesh)), shape.expected_betti(), "{id}");
+            }
         }
     }
 }
