@@ -38,7 +38,7 @@ use medial::simplifier::{
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::ranked::{FacetSet, Published, Ranked, RankedFacets, Scale, Wanted};
+use crate::ranked::{FacetSet, Published, Ranked, Scale, Wanted};
 use crate::{Prepared, Result};
 
 medial::parameters! {
@@ -48,9 +48,6 @@ medial::parameters! {
         /// The filtered elements: Voronoi vertices, or Voronoi facets, edges and vertices, each by
         /// its own value.
         variant: Variant = Variant::Vertex, "vertex or cell";
-        /// For `cell`: keep edges and vertices that pass without a facet, parts like curves and
-        /// points, which belong to the lambda-medial axis by definition.
-        leftovers: bool = true, "true or false";
     }
 }
 
@@ -101,11 +98,10 @@ pub fn method() -> Method<LambdaParams> {
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(shape: &'s Shape, params: LambdaParams, _run: &RunContext) -> Prepared<'s> {
+fn prepare<'s>(shape: &'s Shape, params: LambdaParams, run: &RunContext) -> Prepared<'s> {
     Ok(match params.variant {
-        Variant::Vertex => Box::new(rank_spheres(shape)?),
-        Variant::Cell if params.leftovers => Box::new(rank_cells(shape)?),
-        Variant::Cell => Box::new(rank_facets(shape)?),
+        Variant::Vertex => Box::new(rank_spheres(shape, run)?),
+        Variant::Cell => Box::new(rank_cells(shape, run)?),
     })
 }
 
@@ -121,14 +117,17 @@ fn prepare<'s>(shape: &'s Shape, params: LambdaParams, _run: &RunContext) -> Pre
 //   induced subcomplex supports a number of spheres like every other method.
 
 /// Ranks the spheres of the initial medial mesh. `O(n log n)`.
-fn rank_spheres(shape: &Shape) -> Result<Ranked> {
+fn rank_spheres(shape: &Shape, run: &RunContext) -> Result<Ranked> {
     let mesh = shape.initial()?;
     let mut diagnostics = Diagnostics::default();
     let contacts = shape.contacts(&mesh, &mut diagnostics)?;
     let value = (0..mesh.spheres.len())
         .into_par_iter()
-        .map(|sphere| contacts.with(sphere, |points| enclosing_ball(points).1))
-        .collect();
+        .map(|sphere| {
+            run.check()?;
+            Ok(contacts.with(sphere, |points| enclosing_ball(points).1))
+        })
+        .collect::<Result<_>>()?;
     let scale = scale(&mesh);
     Ok(Ranked::new(mesh, value, scale, diagnostics))
 }
@@ -145,11 +144,10 @@ fn rank_spheres(shape: &Shape) -> Result<Ranked> {
 //    interior has.
 // 2. Keep the cells with `F >= lambda`. The dual of a cell is part of the duals of its sides, so that
 //    values grow from facets to edges to vertices, and the kept part is closed.
-// 3. Facets are cut into triangles. Edges and vertices that pass without a facet stay as they are, or
-//    are left out (`leftovers=false`).
+// 3. Facets are cut into triangles. Edges and vertices that pass without a facet stay as they are.
 //
 // A number of spheres selects the vertices of largest value; of several with the same value, all or
-// none. Without leftovers it selects the facets of largest value.
+// none.
 //
 // # Deviations from the paper
 // - Rounding must not open the result: a value is at least that of the cells around it.
@@ -170,7 +168,7 @@ pub(super) struct Cells {
 }
 
 /// Step 1. `O(n log n)`.
-fn rank_cells(shape: &Shape) -> Result<Cells> {
+fn rank_cells(shape: &Shape, run: &RunContext) -> Result<Cells> {
     let FacetSet { mesh, facets, dual } = FacetSet::of(shape)?;
     let facet_value = facet_values(shape, &facets)?;
     let contacts = mesh.contacts.as_ref().expect("a Voronoi medial mesh has contacts");
@@ -184,6 +182,7 @@ fn rank_cells(shape: &Shape) -> Result<Cells> {
             (shared.len() >= 3).then(|| (ends, enclosing_radius(contacts, &shared)))
         })
         .collect();
+    run.check()?;
     let (edges, mut edge_value): (Vec<[u32; 2]>, Vec<f64>) = found.into_iter().unzip();
     let mut vertex_value: Vec<f64> =
         contacts.of_sphere.par_iter().map(|ids| enclosing_radius(contacts, ids)).collect();
@@ -219,14 +218,6 @@ fn rank_cells(shape: &Shape) -> Result<Cells> {
 
 fn enclosing_radius(contacts: &Contacts, ids: &[u32]) -> f64 {
     enclosing_ball(&ids.iter().map(|&s| contacts.samples[s as usize]).collect::<Vec<_>>()).1
-}
-
-/// The facets alone.
-fn rank_facets(shape: &Shape) -> Result<RankedFacets<'static>> {
-    let set = FacetSet::of(shape)?;
-    let value = facet_values(shape, &set.facets)?;
-    let scale = scale(&set.mesh);
-    Ok(RankedFacets::new(set, value, scale, Diagnostics::default()))
 }
 
 fn facet_values(shape: &Shape, facets: &VoronoiFacets) -> Result<Vec<f64>> {

@@ -1,5 +1,4 @@
-//! Meets a number of spheres by a knob other than the level: the density of the samples, or the
-//! resolution of a lattice. The level is not changed.
+//! Meets a number of spheres by a knob other than the level: the density of the samples, or a dilation.
 //!
 //! 1. The first value is guessed by a power law between knob and spheres.
 //! 2. The next values follow the same law from the nearest value so far, until two values bracket the
@@ -275,11 +274,6 @@ impl Path<'_> {
     }
 }
 
-/// A shape with another number of samples of the same kind.
-pub(crate) fn resampled(shape: &Shape, samples: f64) -> Shape {
-    shape.resampled(shape.options().sampling.with_count(samples as usize))
-}
-
 /// A result, or an empty one where there is nothing inside at this value: the search continues.
 fn or_empty(result: Result<Probe>) -> Result<Probe> {
     match result {
@@ -295,40 +289,28 @@ fn or_empty(result: Result<Probe>) -> Result<Probe> {
     }
 }
 
-// Methods that meet a number of spheres by a knob other than their level: the density of the samples,
-// or the resolution of a lattice (below).
+// Methods that meet a number of spheres by the density of the samples.
 
-/// Prepares a method at a value of the knob; without one, as the shape and the parameters have it.
-type Prepare<'s> = Box<dyn Fn(Option<f64>) -> Prepared<'s> + Send + 's>;
+/// Prepares a method on a shape.
+type Prepare<'s> = Box<dyn Fn(&Shape) -> Prepared<'static> + Send + 's>;
 
-/// A shape whose numbers of spheres are met by a knob. All other levels are those of the value that the
-/// shape and the parameters have. Nothing is kept between levels, so that each costs what it would
-/// cost alone.
-pub(crate) struct ByKnob<'s> {
+/// A shape whose numbers of spheres are met by the number of its samples. All other levels are those of
+/// its own samples. Nothing is kept between levels, so that each costs what it would cost alone.
+pub(crate) struct BySamples<'s> {
+    shape: &'s Shape,
     prepare: Prepare<'s>,
     search: SizeSearch,
     /// The native level of every number of spheres.
     native: f64,
 }
 
-impl<'s> ByKnob<'s> {
-    /// By any knob.
-    pub(crate) fn new(
-        knob: Knob,
-        native: f64,
-        run: &RunContext,
-        prepare: impl Fn(Option<f64>) -> Prepared<'s> + Send + 's,
-    ) -> Self {
-        let search = SizeSearch::new(knob, run);
-        Self { prepare: Box::new(prepare), search, native }
-    }
-
-    /// By the number of samples of a shape. Builds the parts that all samplings share, the tree and the inside
-    /// test of the surface, so that they count as substrates.
+impl<'s> BySamples<'s> {
+    /// Builds the parts that all samplings share, the tree and the inside test of the surface, so that they
+    /// count as substrates.
     ///
     /// # Errors
     /// When the surface has no face.
-    pub(crate) fn of_samples(
+    pub(crate) fn new(
         shape: &'s Shape,
         native: f64,
         run: &RunContext,
@@ -336,27 +318,24 @@ impl<'s> ByKnob<'s> {
     ) -> Result<Self> {
         shape.surface_tree()?;
         shape.inside_test();
-        Ok(Self::new(Knob::samples(), native, run, move |samples| {
-            Ok(match samples {
-                None => prepare(shape)?,
-                Some(samples) => prepare(&resampled(shape, samples))?,
-            })
-        }))
+        let search = SizeSearch::new(Knob::samples(), run);
+        Ok(Self { shape, prepare: Box::new(prepare), search, native })
     }
 }
 
-impl Simplification for ByKnob<'_> {
+impl Simplification for BySamples<'_> {
     fn at(&mut self, level: Level) -> Result<Simplified> {
+        let Self { shape, prepare, search, native } = self;
         let Level::Spheres(count @ 1..) = level else {
-            return (self.prepare)(None)?.at(level);
+            return prepare(shape)?.at(level);
         };
-        let Self { prepare, search, native, .. } = self;
         search.at(
             count,
             |_| *native,
-            |value| {
-                let Simplified { mesh, diagnostics, .. } =
-                    prepare(Some(value))?.at(Level::Native(*native))?;
+            |samples| {
+                let sampling = shape.options().sampling.with_count(samples as usize);
+                let mut prepared = prepare(&shape.resampled(sampling))?;
+                let Simplified { mesh, diagnostics, .. } = prepared.at(Level::Native(*native))?;
                 Ok(Probe { mesh, diagnostics })
             },
         )

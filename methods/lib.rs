@@ -34,49 +34,42 @@ pub fn registry() -> Vec<Registered> {
     let methods = vec![
         Registered::from(angle::method())
             .best_for(
-                "Removing spikes alone from the axis of dense samples, on small and large parts \
-                 alike; not for few spheres, and the topology may break (the variant homotopy \
-                 keeps it).",
+                "Removing spikes of any size from the axis of dense samples, where \
+                 thousands of spheres may stay.",
             )
             .filter(Level::Published)
             .sweep(&[30.0, 60.0, 120.0]),
         Registered::from(lambda::method())
             .best_for(
-                "Removing small features by absolute size from the axis of dense samples, with a \
-                 proof that the rest is stable; not where thin parts must stay next to thick \
-                 ones, and not for few spheres.",
+                "Removing features by absolute size from the axis of dense samples, \
+                 with a proof that the rest is stable.",
             )
             .filter(Level::Published)
             .sweep(&[0.01, 0.02]),
         Registered::from(dey_zhao::method())
             .best_for(
-                "Dense samples of any shape with one pair of constants; with denser samples it \
-                 converges to the medial axis, but it promises no topology, and is not for few \
-                 spheres.",
+                "An axis of dense samples of any shape, without a parameter to \
+                 tune.",
             )
             .filter(Level::Published)
             .sweep(&[1.0, 2.0, 3.0]),
         Registered::from(qmat::method()).best_for(
-            "A small number of spheres in about a second: spikes go first, and each \
-                 merged sphere is placed again.",
+            "A small number of spheres in about a second, each placed where its \
+             error is least.",
         ),
         Registered::from(pmat::method())
-            .best_for(
-                "Every level from one run, nested and without a parameter, with spheres of \
-                 the start alone; loops may close, and with few spheres the error is large.",
-            )
+            .best_for("All levels from one run, nested and without a parameter.")
             .sweep(&[2.0, 4.0, 8.0]),
         Registered::from(hem::method())
             .best_for(
-                "Few spheres for a given error where speed matters less: usually fewer than \
-                 Q-MAT needs, at many times its seconds.",
+                "Few spheres for a given error where speed matters less, usually \
+                 fewer than Q-MAT needs.",
             )
             .sweep(&[0.01, 0.02, 0.04]),
         Registered::from(sat::method())
             .best_for(
-                "Removing features that are small for their surroundings, while equally small \
-                 ones elsewhere stay; gaps may fill, spheres are new ones, and it is not for few \
-                 spheres.",
+                "Removing features that are small for their surroundings, while \
+                 equally small ones elsewhere stay.",
             )
             .filter(Level::Published)
             .sweep(&[1.1, 1.5, 2.0]),
@@ -85,42 +78,34 @@ pub fn registry() -> Vec<Registered> {
             .sweep(&[1.1, 1.5, 2.0])
             .on_request(),
         Registered::from(tam_heidrich::method())
-            .best_for(
-                "Removing whole features of little volume, while loops stay; it does not reach \
-                 small numbers of spheres.",
-            )
+            .best_for("Removing whole features of little volume, while loops stay.")
             .filter(Level::Published)
             .sweep(&[1.0, 5.0]),
         Registered::from(aof::method())
             .best_for(
-                "Straight from the surface, where its samples give too poor a start: the \
-                 lattice is as fine as requested; for thousands of spheres rather than \
-                 hundreds.",
+                "An axis of thousands of spheres straight from the surface, where \
+                 its samples give too poor a start.",
             )
             // The published lattice takes far longer: that of the other levels is enough.
             .filter(Level::Native(30.0))
             .sweep(&[15.0, 30.0, 60.0]),
-        Registered::from(coverage_axis::method(qmat::keeping))
+        Registered::from(coverage_axis::method())
             .best_for(
-                "Some tens of spheres as a skeleton: spheres stay where the medial axis has \
-                 them, and details smaller than the dilation go.",
+                "Some tens of spheres as a skeleton, each where the medial axis has \
+                 it.",
             )
             .sweep(&[0.01, 0.02, 0.05]),
         Registered::from(vmas::method())
-            .best_for(
-                "Few spheres in even places, on organic shapes; seconds to a minute for each \
-                 count. No Voronoi diagram is needed. Nothing holds the topology, and it is not \
-                 for CAD models or more than a few hundred spheres.",
-            )
+            .best_for("Up to a few hundred evenly spread spheres of an organic shape.")
             .on_request(),
         Registered::from(tight::method(qmat::method())).best_for(
-            "The least two-sided error with few spheres; 4 to 24 CPU seconds for each count \
-                 up to 500. It keeps the topology of its start.",
+            "The least two-sided error with few spheres, for 4 to 24 CPU \
+             seconds a count up to 500.",
         ),
         Registered::from(cover::method())
             .best_for(
-                "Spheres alone, as collision models and grains are made of: they contain the solid, fit \
-                 into it, or deviate least from it, with a certified bound. The result has no edges.",
+                "Spheres alone as in collision models, with a certified bound of \
+                 the deviation.",
             )
             .on_request(),
     ];
@@ -139,8 +124,8 @@ pub fn registry() -> Vec<Registered> {
 pub fn version(id: &str) -> Option<String> {
     let module = id.replace('-', "_");
     let mut parts = vec![hash_of(&module)?];
-    // These two hand their result to Q-MAT.
-    if module == "coverage_axis" || module == "tight" {
+    // Its start is a result of Q-MAT.
+    if module == "tight" {
         parts.push(hash_of("qmat").unwrap_or_default());
     }
     parts.push(hash_of("shared").unwrap_or_default());
@@ -204,6 +189,14 @@ fn references(keys: &[&str]) -> String {
         all.filter(|entry| keys.iter().any(|key| entry.contains(&format!("{{{key},")))).collect();
     assert_eq!(found.len(), keys.len(), "no entry for one of {keys:?}");
     found.join("\n")
+}
+
+/// A built-in solid, for unit tests.
+#[cfg(test)]
+fn test_shape(id: &str, resolution: u32) -> medial::shape::Shape {
+    let mesh = medial_datasets::find(id).expect("in the catalogue").mesh(resolution);
+    let report = medial::surface::validate(&mesh).expect("a solid");
+    medial::shape::Shape::new(id, &mesh, report, Default::default()).expect("an extent")
 }
 
 #[cfg(test)]

@@ -45,9 +45,11 @@ pub fn method() -> Method<NoParams> {
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(shape: &'s Shape, _: NoParams, _run: &RunContext) -> Prepared<'s> {
+fn prepare<'s>(shape: &'s Shape, _: NoParams, run: &RunContext) -> Prepared<'s> {
     let mesh = shape.initial()?;
+    run.check()?;
     let value = critical_scales(&mesh.spheres);
+    run.check()?;
     let scale = Scale {
         name: "s",
         range: 0.0..=f64::MAX,

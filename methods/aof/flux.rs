@@ -44,13 +44,11 @@ use medial::shape::Shape;
 use medial::simplifier::RunContext;
 use medial::surface::{Closest, Feature, InsideTest, TriMesh, TriangleBvh, Vicinity};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use crate::Result;
 
 /// How samples lie on a sphere.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spiral {
     /// Heights `-1 + (2k - 1) / N`, in the middle of zones of equal area.
     EqualArea,
@@ -435,17 +433,14 @@ impl Ray<'_> {
 
 #[cfg(test)]
 mod tests {
-    use medial::shape::ShapeOptions;
     use medial::surface::Side;
 
     use super::*;
 
     #[test]
     fn only_the_reflex_edge_and_its_vertices_are_fans() {
+        let shape = crate::test_shape("bracket", 16);
         let mesh = medial_datasets::find("bracket").expect("in the catalogue").mesh(16);
-        let report = medial::surface::validate(&mesh).expect("a solid");
-        let shape = Shape::new("bracket", &mesh, report, ShapeOptions::default());
-        let shape = shape.expect("an extent");
         let surface = Surface::of(&shape).expect("faces");
         let is_fan = |p| surface.is_fan(&surface.closest(shape.normalisation().forward(p), None));
         // Away from the ends of the bracket, which are nearer than anything else there.
@@ -469,10 +464,7 @@ mod tests {
         let sphere = Sphere::new(Spiral::EqualArea, 50, 0.01);
         let (mut small, mut left_out) = (0, 0);
         for name in ["bracket", "torus"] {
-            let mesh = medial_datasets::find(name).expect("in the catalogue").mesh(16);
-            let report = medial::surface::validate(&mesh).expect("a solid");
-            let shape = Shape::new(name, &mesh, report, ShapeOptions::default());
-            let shape = shape.expect("an extent");
+            let shape = crate::test_shape(name, 16);
             let surface = Surface::of(&shape).expect("faces");
             let (lo, hi) = shape.mesh().bounding_box().expect("vertices");
             for k in 0..24_u32.pow(3) {

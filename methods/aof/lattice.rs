@@ -10,8 +10,8 @@
 //! 2. Each voxel gets its distance `D` to the surface. It has the side of its parent, without a test,
 //!    if the parent's distance exceeds that of its farthest descendant.
 //! 3. Above the finest level: where the sphere of radius `sigma` lies inside (`D >= sigma`), `AOF'`
-//!    is evaluated, and the voxel with all its descendants dismissed if `AOF' >= 0`, by default up
-//!    to the flux of the samples themselves in a constant field.
+//!    is evaluated, and the voxel with all its descendants dismissed if `AOF' >= 0`, with our rules down
+//!    to minus the flux of the samples themselves in a constant field.
 //! 4. At the finest level: `AOF'` of every voxel whose sphere lies inside. The final threshold is
 //!    applied later, as it depends on the requested level. At the published level it is known: then
 //!    a sphere is given up as soon as the samples left cannot bring its flux down to it.
@@ -27,7 +27,7 @@ use medial::surface::{Closest, Side, TriMesh};
 use rayon::prelude::*;
 
 use super::flux::{FEW, MANY, Near, SMALL, Sphere, Surface};
-use super::{AofParams, Dismiss, Start};
+use super::{LatticeSetting, Rules, SAMPLES, SPLIT, SUBDIVISION};
 use crate::Result;
 
 /// A lattice whose voxels have `resolution` along the longest side of the bounding box; its lower
@@ -38,10 +38,8 @@ pub struct Grid {
     pub origin: Vec3,
     /// `sigma` at the finest level.
     pub side: f64,
-    /// Voxels along each axis at the finest level, a multiple of `split`.
+    /// Voxels along each axis at the finest level, a multiple of the side of a coarse voxel.
     pub size: [u32; 3],
-    /// Voxels of the finest level along a side of the coarsest.
-    pub split: u32,
 }
 
 impl Grid {
@@ -49,21 +47,21 @@ impl Grid {
     ///
     /// # Panics
     /// If the mesh has no vertices.
-    pub fn new(mesh: &TriMesh, resolution: u32, split: u32) -> Self {
+    pub fn new(mesh: &TriMesh, resolution: u32) -> Self {
         let (lo, hi) = mesh.bounding_box().expect("a shape has vertices");
         let extent = hi - lo;
         let side = extent.max_element() / f64::from(resolution);
         // Rounding must not add a voxel to a side that is a whole number of voxels.
         let size = extent.to_array().map(|length| {
             let voxels = (length / side * (1.0 - 1e-9)).ceil().max(1.0) as u32;
-            voxels.next_multiple_of(split)
+            voxels.next_multiple_of(SPLIT)
         });
-        Self { origin: lo, side, size, split }
+        Self { origin: lo, side, size }
     }
 
     /// Lower corner of a coarse voxel.
     fn coarse_corner(&self, place: [u32; 3]) -> Vec3 {
-        self.origin + Vec3::from(place.map(f64::from)) * f64::from(self.split) * self.side
+        self.origin + Vec3::from(place.map(f64::from)) * f64::from(SPLIT) * self.side
     }
 
     /// Centre of a voxel of the finest level.
@@ -333,8 +331,6 @@ pub enum Wanted {
     Places,
     /// Values of voxels with at most this flux; that of others that are not dismissed is infinite.
     AtMost(f32),
-    /// Values of all voxels that are not dismissed.
-    Kept,
     /// Values of all voxels to begin with: distances of dismissed ones too.
     All,
 }
@@ -367,11 +363,11 @@ pub struct Descent {
 pub(super) fn coarse_to_fine(
     surface: &Surface,
     grid: Grid,
-    params: &AofParams,
+    setting: &LatticeSetting,
     wanted: Wanted,
     run: &RunContext,
 ) -> Result<Descent> {
-    let levels = levels(&grid, params)?;
+    let levels = levels(&grid, setting.rules);
     let blocks = blocks(surface, &grid);
     let done = AtomicUsize::new(0);
     let none = Tally { dismissed: vec![0; levels.len() - 1], ..Tally::default() };
@@ -379,9 +375,15 @@ pub(super) fn coarse_to_fine(
         .par_iter()
         .map(|block| {
             run.step(done.fetch_add(1, Ordering::Relaxed), blocks.len())?;
-            let (levels, start, tally) = (&levels[..], params.start, none.clone());
-            let mut walk =
-                Walk { surface, grid: &grid, levels, start, wanted, voxels: Vec::new(), tally };
+            let mut walk = Walk {
+                surface,
+                grid: &grid,
+                levels: &levels,
+                starts_coarse: setting.starts_coarse,
+                wanted,
+                voxels: Vec::new(),
+                tally: none.clone(),
+            };
             walk.block(block);
             Ok((walk.voxels, walk.tally))
         })
@@ -408,15 +410,14 @@ struct LatticeLevel {
 }
 
 /// From coarse to fine.
-fn levels(grid: &Grid, params: &AofParams) -> Result<Vec<LatticeLevel>> {
-    let counts = params.sample_counts()?.into_iter();
-    let levels = counts.zip((0..params.levels).rev()).map(|(count, finer)| {
-        let size = params.d.pow(finer);
-        let sphere = Sphere::new(params.spiral, count, grid.side * f64::from(size));
-        let dismissed_from = if params.dismiss == Dismiss::Zero { 0.0 } else { -sphere.bias };
+fn levels(grid: &Grid, rules: Rules) -> Vec<LatticeLevel> {
+    let levels = SAMPLES.into_iter().zip((0..SAMPLES.len() as u32).rev()).map(|(count, finer)| {
+        let size = SUBDIVISION.pow(finer);
+        let sphere = Sphere::new(rules.spiral(), count, grid.side * f64::from(size));
+        let dismissed_from = if rules == Rules::Published { 0.0 } else { -sphere.bias };
         LatticeLevel { sphere, size, dismissed_from }
     });
-    Ok(levels.collect())
+    levels.collect()
 }
 
 /// A box of coarse voxels, and a face near it.
@@ -428,7 +429,7 @@ struct Block {
 
 /// Step 1.
 fn blocks(surface: &Surface, grid: &Grid) -> Vec<Block> {
-    let whole = Block { lo: [0; 3], hi: grid.size.map(|n| n / grid.split), face: 0 };
+    let whole = Block { lo: [0; 3], hi: grid.size.map(|n| n / SPLIT), face: 0 };
     let longest = whole.hi.into_iter().max().unwrap_or(0);
     let most = (longest / BLOCKS).clamp(1, BLOCK);
     let (mut open, mut done) = (vec![whole], Vec::new());
@@ -463,7 +464,7 @@ struct Walk<'a> {
     surface: &'a Surface,
     grid: &'a Grid,
     levels: &'a [LatticeLevel],
-    start: Start,
+    starts_coarse: bool,
     wanted: Wanted,
     voxels: Vec<Voxel>,
     tally: Tally,
@@ -485,7 +486,7 @@ impl Walk<'_> {
         for z in block.lo[2]..block.hi[2] {
             for y in block.lo[1]..block.hi[1] {
                 for x in block.lo[0]..block.hi[0] {
-                    self.visit(0, [x, y, z].map(|i| i * self.grid.split), known, None);
+                    self.visit(0, [x, y, z].map(|i| i * SPLIT), known, None);
                 }
             }
         }
@@ -507,7 +508,7 @@ impl Walk<'_> {
         let spread = HALF_DIAGONAL * (sphere.radius - self.grid.side);
         let finest = level + 1 == self.levels.len();
         let sphere_fits = distance >= sphere.radius;
-        if !sphere_fits && (finest || level == 0 && self.start == Start::Coarse) {
+        if !sphere_fits && (finest || level == 0 && self.starts_coarse) {
             return;
         }
         // Farther from the surface than any descendant's centre is away: all have this side.
@@ -543,7 +544,7 @@ impl Walk<'_> {
         if evaluate && flux >= dismissed_from {
             self.tally.dismissed[level] += u64::from(size).pow(3);
             known.dismissed = true;
-            if matches!(self.wanted, Wanted::Kept | Wanted::AtMost(_)) {
+            if matches!(self.wanted, Wanted::AtMost(_)) {
                 self.tally.start += u64::from(size).pow(3);
                 return;
             }

@@ -10,8 +10,8 @@
 //! 3. `AOF'`: the mean of `grad D . N`, where samples on two-sided fans of concave edges and vertices
 //!    add nothing (section 4, theorem 4.14): negative if and only if the axis meets the sphere.
 //! 4. Coarse to fine: voxels with `AOF' >= 0` are dismissed, the others split (Algorithm 1).
-//! 5. At the finest level voxels with `AOF' <= -1/8 sin alpha` are kept (proposition 5.1), or the
-//!    others deleted where they are simple (section 6.3), or the voxels thinned by flux.
+//! 5. At the finest level the voxels are thinned by flux (section 3.3 of Siddiqi et al. 2002), or those
+//!    with a flux at or below a threshold are kept (proposition 5.1), as the level requires.
 //! 6. A sphere for each voxel, moved onto the axis; edges and triangles between neighbours, with
 //!    the Betti numbers of the voxels. The voxels themselves are in [`Extras`], as
 //!    [`LatticeVoxels`].
@@ -31,33 +31,29 @@
 //!
 //! # Deviations from the paper
 //!
-//! - *The defaults of every level but the published one*: a lattice of 54 voxels along the longest side,
-//!   thinned by flux (section 3.3 of Siddiqi et al. 2002) with `mu = 3/8` for its end points. The
-//!   paper has 369 voxels in its figures, and keeps by threshold (`variant=plain`, `mu = 1/8`) or
-//!   deletes by distance (`variant=homotopy`). Kept by threshold a sheet is two voxels thick and torn,
-//!   and a lattice of 369 has far more voxels than the other methods have spheres.
-//!   [`Level::Published`] has the paper's: `resolution=369`, `variant=plain`, a flux of -0.2,
-//!   `spiral=classic`, `start=coarse`, `dismiss=zero`, `refine=false`, unless set otherwise.
-//!   If 369 does not fit into `max_memory`, or no coarse voxel fits into the solid, a warning names
-//!   the substitute.
+//! - *All levels but the published one* have our own rules ([`Rules::Own`]): a lattice of 54 voxels along
+//!   the longest side, thinned by flux with `mu = 3/8` for its end points. The paper has 369 voxels in its
+//!   figures, and keeps by threshold. Kept by threshold a sheet is two voxels thick and torn, and a lattice
+//!   of 369 has far more voxels than the other methods have spheres. [`Level::Published`] has the paper's
+//!   rules ([`Rules::Published`]). If 369 does not fit into [`MAX_MEGABYTES`], or no coarse voxel fits into
+//!   the solid, a warning names the substitute.
+//! - The paper's deletion by distance (section 6.3) is left out: thinning by flux keeps the topology too.
 //! - Either spiral has a mean direction that is not zero, so that a constant field has a flux of up
-//!   to that length. Coarse voxels are dismissed if `AOF'` is not below minus this length
-//!   (`dismiss=bias`); with the paper's 0 (`dismiss=zero`) half the directions of a plane are never
-//!   dismissed. Neither reproduces its Table 2: of the box 45.9 % go at the first level there, of
-//!   the built-in box 31 % with zero and 64 % with bias.
+//!   to that length. Our rules dismiss coarse voxels if `AOF'` is not below minus this length; with the
+//!   paper's 0 half the directions of a plane are never dismissed. Neither reproduces its Table 2: of the
+//!   box 45.9 % go at the first level there, of the built-in box 31 % with 0 and 64 % with the length.
 //! - If the start set on a lattice has other Betti numbers than the solid, or leaves part of the
 //!   surface far from every voxel, the lattice is refined up to three times, and the best one is used
 //!   (`solid.rs`). Warnings list the remaining losses.
 //! - Line 3 of Algorithm 1, read literally, begins with the smallest spheres. The intended meaning is
 //!   `sigma` at the coarsest level and `sigma / d^j` after `j` divisions.
-//! - The equal-area spiral is the default: its largest error on a plane through the centre is about
-//!   0.6 of that of the classic one (held by a test in `flux.rs`). `spiral=classic` is the paper's.
-//! - A coarse voxel whose sphere does not fit inside is split instead of dropped, so that the start
-//!   set is that of the finest level (`start=fine`). The paper's rule (`start=coarse`) loses every part
-//!   thinner than twice the coarsest voxel.
-//! - `homotopy` deletes at the finest level alone, where dismissed voxels count as flux 0; the
-//!   paper deletes simple voxels at each level. Both keep the homotopy type of the start set; this
-//!   way it is the start set of the finest level.
+//! - Our rules have the equal-area spiral: its largest error on a plane through the centre is about
+//!   0.6 of that of the paper's classic one (held by a test in `flux.rs`).
+//! - Our rules split a coarse voxel whose sphere does not fit inside, so that the start set is that of
+//!   the finest level. The paper drops it, and loses every part thinner than twice the coarsest voxel.
+//! - Voxels are thinned at the finest level alone, where dismissed voxels count as flux 0; the paper
+//!   deletes simple voxels at each level. Both keep the homotopy type of the start set; this way it is
+//!   the start set of the finest level.
 //! - [`Level::Spheres`] is not in the paper. Ranking the voxels of a fine lattice by `AOF'` leaves
 //!   scattered pieces of the flattest sheet. Instead the lattice is made as coarse or as fine as the
 //!   count requires, while its start set keeps the topology. Then simple voxels are deleted from its
@@ -74,7 +70,7 @@ use std::ops::Bound::{self, Excluded, Included};
 use medial::shape::Shape;
 use medial::simplifier::{
     Capability, Extras, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext,
-    Simplified, SimplifyError,
+    Simplification, Simplified, SimplifyError,
 };
 use serde::{Deserialize, Serialize};
 
@@ -90,9 +86,8 @@ pub const VOXELS: &str = "voxels";
 
 /// The average outward flux as a method.
 ///
-/// The published level has the paper's parameters where none are set. Cost `O(V N)` closest points for
-/// `V` voxels, memory `O(V)`.
-pub fn method() -> Method<AofSettings> {
+/// The published level has the paper's rules. Cost `O(V N)` closest points for `V` voxels, memory `O(V)`.
+pub fn method() -> Method<AofParams> {
     let info = MethodInfo::new("aof", "Average outward flux")
         .citation(
             "Svetlana Stolpner, Kaleem Siddiqi 2006. Revealing Significant Medial Structure in \
@@ -109,49 +104,67 @@ pub fn method() -> Method<AofSettings> {
              side, or as many as fit into memory; the paper chooses a flux for each model, -0.15 to \
              -0.25",
         )
-        .params(AofSettings::describe())
+        .params(AofParams::describe())
         .extra(Capability::new(VOXELS, "the voxels that the spheres stand for, with their flux"));
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(shape: &'s Shape, settings: AofSettings, run: &RunContext) -> Prepared<'s> {
-    if shape.has_given_initial() {
-        let why = "it starts from no medial mesh: leave out --initial";
-        return Err(SimplifyError::unsupported(why));
+fn prepare<'s>(shape: &'s Shape, params: AofParams, run: &RunContext) -> Prepared<'s> {
+    Ok(Box::new(PreparedAof::new(shape, params, run)?))
+}
+
+/// A solid and the lattice of its levels.
+struct PreparedAof<'s> {
+    shape: &'s Shape,
+    run: RunContext,
+    resolution: Resolution,
+    /// The lattice of all levels but the published one, made by the first of them.
+    own: Option<(Solid<'s>, Base)>,
+}
+
+impl<'s> PreparedAof<'s> {
+    fn new(shape: &'s Shape, params: AofParams, run: &RunContext) -> Result<Self> {
+        if shape.has_given_initial() {
+            let why = "it starts from no medial mesh: leave out --initial";
+            return Err(SimplifyError::unsupported(why));
+        }
+        if let Resolution::Voxels(resolution) = params.resolution {
+            within("resolution", resolution, 1..=MAX_RESOLUTION)?;
+        }
+        // Both kinds of levels need them, so they count as substrates of the preparation.
+        shape.surface_tree()?;
+        shape.inside_test();
+        Ok(Self { shape, run: run.clone(), resolution: params.resolution, own: None })
     }
-    settings.at(Level::Published).validate()?;
-    let params = settings.at(Level::Spheres(1)).validate()?;
-    // In the parameters of a level 0 stands for the value of the variant.
-    if let Auto::Value(mu) = settings.mu {
-        within("mu", mu, (Excluded(0.0), Included(0.75)))?;
-    }
-    let solid = Solid::new(shape, params, run.clone())?;
-    let base = match solid.base() {
-        // The published level may have a lattice that fits. Other levels repeat the error.
-        Err(SimplifyError::Parameter(_)) => None,
-        base => Some(base?),
-    };
-    let run = run.clone();
-    Ok(Box::new(move |level: Level| {
-        // The published level has a separate lattice, unless all parameters are set.
-        if level == Level::Published && settings.at(level) != solid.params {
-            let (solid, base) = solid::published(shape, &settings, &run)?;
+}
+
+impl Simplification for PreparedAof<'_> {
+    fn at(&mut self, level: Level) -> Result<Simplified> {
+        let level = some_spheres(level)?;
+        if let Level::Native(angle) = level {
+            level_within("angle", angle, ANGLES)?;
+        }
+        if level == Level::Published {
+            let (solid, base) = solid::published(self.shape, self.resolution, &self.run)?;
             return at(&solid, &base, level);
         }
-        match &base {
-            Some(base) => at(&solid, base, level),
-            None => at(&solid, &solid.base()?, level),
-        }
-    }))
+        let (solid, base) = match &mut self.own {
+            Some(own) => own,
+            own => {
+                let setting = LatticeSetting::own(self.resolution.or(OWN_RESOLUTION));
+                let solid = Solid::new(self.shape, setting, self.run.clone())?;
+                let base = solid.base()?;
+                own.insert((solid, base))
+            }
+        };
+        at(solid, base, level)
+    }
 }
 
 fn at(solid: &Solid<'_>, base: &Base, level: Level) -> Result<Simplified> {
     let mut diagnostics = base.diagnostics.clone();
-    let angle = match level {
-        Level::Native(angle) => level_within("angle", angle, ANGLES)?,
-        Level::Spheres(_) | Level::Published => solid.params.angle,
-    };
-    let axis = match some_spheres(level)? {
+    let angle = if let Level::Native(angle) = level { angle } else { solid.setting.angle };
+    let axis = match level {
         Level::Spheres(count) => solid.with_count(base, count, &mut diagnostics)?,
         Level::Native(_) | Level::Published => {
             solid.warn_of(base.loss, base.resolution, &mut diagnostics);
@@ -172,222 +185,143 @@ fn at(solid: &Solid<'_>, base: &Base, level: Level) -> Result<Simplified> {
     Ok(Simplified { native_level, diagnostics, extras, ..Simplified::new(mesh, level) })
 }
 
-/// Most voxels along a side of the bounding box: places have 16 bits.
+/// Limit of the resolution: the indices of a [`Place`] have 16 bits.
 pub(super) const MAX_RESOLUTION: u32 = 60_000;
-/// Most voxels along the longest side of a coarse voxel.
-const MAX_SPLIT: u32 = 1024;
 
-/// Object angles, in degrees.
+/// Range of object angles, in degrees.
 const ANGLES: (Bound<f64>, Bound<f64>) = (Excluded(0.0), Included(90.0));
 
-/// Samples of the three default levels.
-const SAMPLES: &str = "70/60/50";
+/// `d` of the paper: each voxel is split into 3 x 3 x 3.
+const SUBDIVISION: u32 = 3;
+/// `N`: samples on the sphere of a voxel, for each level of resolution from coarse to fine.
+const SAMPLES: [usize; 3] = [70, 60, 50];
+/// Voxels of the finest level along a side of the coarsest.
+pub(super) const SPLIT: u32 = SUBDIVISION.pow(SAMPLES.len() as u32 - 1);
+
+/// Voxels along the longest side at all levels but the published one, unless set.
+const OWN_RESOLUTION: u32 = 54;
 /// Voxels along the longest side in the paper's figures of the torus and the cow.
 const PUBLISHED_RESOLUTION: u32 = 369;
-/// Flux at or below which the paper's figures of Venus and the cow keep a voxel.
+/// Flux at or below which the paper's figures of Venus and the cow keep a voxel, negated.
 const PUBLISHED_FLUX: f64 = 0.2;
-/// `mu` on a sheet.
-const ON_SHEET: f64 = 0.5;
+/// Object angle of the thinnest sheets of a number of spheres, in degrees.
+const OWN_ANGLE: f64 = 30.0;
+/// Memory for voxels and medial mesh, in megabytes. Finer lattices are refused.
+pub const MAX_MEGABYTES: f64 = 2000.0;
 
-/// A value, or that of the level: most defaults are the paper's at the published level and our own at
-/// all others.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase", expecting = "expected `auto`, a number or a word of the list")]
-pub enum Auto<T> {
+/// Voxels along the longest side of the bounding box.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase", expecting = "expected `auto` or a number of voxels")]
+pub enum Resolution {
     /// That of the level.
     Auto,
-    /// The value.
+    /// The number.
     #[serde(untagged)]
-    Value(T),
+    Voxels(u32),
 }
 
-impl<T: Copy> Auto<T> {
-    fn or(self, value: T) -> T {
+impl Resolution {
+    fn or(self, of_level: u32) -> u32 {
         match self {
-            Self::Value(value) => value,
-            Self::Auto => value,
+            Self::Voxels(voxels) => voxels,
+            Self::Auto => of_level,
         }
     }
 }
 
 medial::parameters! {
-    /// Parameters as the user sets them; [`AofSettings::at`] has their values at a level.
-    #[derive(Clone, Debug, PartialEq)]
-    pub struct AofSettings {
+    /// Parameters of the average outward flux.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct AofParams {
         /// Voxels along the longest side of the bounding box, at the finest level; auto is 54, and
         /// 369 at the published level, or as many as fit into memory.
-        resolution: Auto<u32> = Auto::Auto, "voxels, or auto";
-        /// `d`: each voxel is split into d x d x d.
-        d: u32 = 3, "number";
-        /// Levels of resolution, from coarse to fine.
-        levels: u32 = 3, "number";
-        /// `N`: samples on each sphere, from the coarsest level to the finest, or one number for all.
-        #[serde(deserialize_with = "number_or_text")]
-        samples: String = SAMPLES.to_owned(), "numbers, separated by /";
-        /// `alpha`: object angle of the thinnest sheets that are kept, when no level names one; auto
-        /// is 30, and 23.6 at the published level, where sheets have a flux of -0.2.
-        angle: Auto<f64> = Auto::Auto, "degrees, or auto";
-        /// Factor of the threshold -mu sin(angle); auto is 0.125 for plain and homotopy, where a sheet
-        /// anywhere in a voxel keeps it, 0.375 for the end points of thinning, and 0.5 at the
-        /// published level.
-        mu: Auto<f64> = Auto::Auto, "pure number, or auto";
-        /// Keep by threshold; delete simple voxels alone, outermost first; or thin by flux; auto is
-        /// thinning, and plain at the published level.
-        variant: Auto<Variant> = Auto::Auto, "plain, homotopy, thinning or auto";
-        /// How samples lie on the sphere; auto is equal-area, and classic at the published level.
-        spiral: Auto<Spiral> = Auto::Auto, "equal-area, classic or auto";
-        /// Begin with the voxels whose spheres fit inside at the finest level, or at the coarsest as
-        /// in the paper; auto is fine, and coarse at the published level where that has a voxel.
-        start: Auto<Start> = Auto::Auto, "fine, coarse or auto";
-        /// Dismiss coarse voxels from a flux of 0 on, as in the paper, or of minus that of the samples
-        /// in a constant field; auto is bias, and zero at the published level.
-        dismiss: Auto<Dismiss> = Auto::Auto, "zero, bias or auto";
-        /// Move centres onto the axis, between opposite closest points; auto is true, and false at the
-        /// published level.
-        refine: Auto<bool> = Auto::Auto, "true, false or auto";
-        /// Limit of the memory for voxels and the medial mesh.
-        max_memory: f64 = 2000.0, "megabytes";
+        resolution: Resolution = Resolution::Auto, "voxels, or auto";
     }
 }
 
-impl AofSettings {
-    /// The parameters at a level.
-    pub fn at(&self, level: Level) -> AofParams {
-        // Of two values the first is the paper's, for the published level, the second ours.
-        let ours = usize::from(level != Level::Published);
-        AofParams {
-            resolution: self.resolution.or([PUBLISHED_RESOLUTION, 54][ours]),
-            d: self.d,
-            levels: self.levels,
-            samples: self.samples.clone(),
-            angle: self.angle.or([(PUBLISHED_FLUX / ON_SHEET).asin().to_degrees(), 30.0][ours]),
-            mu: self.mu.or([ON_SHEET, 0.0][ours]),
-            variant: self.variant.or([Variant::Plain, Variant::Thinning][ours]),
-            spiral: self.spiral.or([Spiral::Classic, Spiral::EqualArea][ours]),
-            start: self.start.or([Start::Coarse, Start::Fine][ours]),
-            dismiss: self.dismiss.or([Dismiss::Zero, Dismiss::Bias][ours]),
-            refine: self.refine.or([false, true][ours]),
-            max_memory: self.max_memory,
+/// The rules of a descent, and of the axis on its lattice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rules {
+    /// The paper's: classic spiral, coarse voxels dismissed from a flux of 0 on, voxels kept by threshold,
+    /// centres where they are.
+    Published,
+    /// Equal-area spiral, coarse voxels dismissed from minus its flux in a constant field on, voxels
+    /// thinned by flux, centres moved onto the axis.
+    Own,
+}
+
+impl Rules {
+    /// The samples on spheres.
+    pub(super) fn spiral(self) -> Spiral {
+        match self {
+            Self::Published => Spiral::Classic,
+            Self::Own => Spiral::EqualArea,
         }
     }
-}
 
-/// Parameters at one level; [`AofSettings`] has their meaning. The default is that of every level but
-/// the published one.
-#[derive(Clone, Debug, PartialEq)]
-#[allow(missing_docs, reason = "documented by the fields of the settings")]
-pub struct AofParams {
-    pub resolution: u32,
-    pub d: u32,
-    pub levels: u32,
-    pub samples: String,
-    pub angle: f64,
-    /// 0 for 1/8 where voxels are kept by the threshold, and 3/8 where only end points are.
-    pub mu: f64,
-    pub variant: Variant,
-    pub spiral: Spiral,
-    pub start: Start,
-    pub dismiss: Dismiss,
-    pub refine: bool,
-    pub max_memory: f64,
-}
-
-impl Default for AofParams {
-    fn default() -> Self {
-        AofSettings::default().at(Level::Spheres(1))
-    }
-}
-
-/// The use of the flux.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Variant {
-    /// All voxels with a flux at or below the threshold.
-    Plain,
-    /// Voxels above the threshold are deleted where they are simple, outermost first.
-    Homotopy,
-    /// Simple voxels are deleted by flux, the least medial first, except for end points below the
-    /// threshold (Siddiqi, Bouix, Tannenbaum, Zucker 2002).
-    Thinning,
-}
-
-/// The start set of voxels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Start {
-    /// Voxels of the finest level whose spheres lie inside. Coarser ones that do not are split.
-    Fine,
-    /// Voxels of the coarsest level whose spheres lie inside, as in the paper.
-    Coarse,
-}
-
-/// From which flux on a coarse voxel is dismissed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Dismiss {
-    /// `AOF' >= 0`, as in the paper.
-    Zero,
-    /// Where `AOF'` is not below minus the flux that the samples have in a constant field.
-    Bias,
-}
-
-impl AofParams {
-    /// The parameters if they are in their ranges.
-    fn validate(self) -> Result<Self> {
-        within("resolution", self.resolution, 1..=MAX_RESOLUTION)?;
-        within("levels", self.levels, 1..)?;
-        within("d", self.d, if self.levels > 1 { 2.. } else { 0.. })?;
-        let split = self.d.checked_pow(self.levels - 1).unwrap_or(u32::MAX);
-        within("d^(levels - 1)", split, 0..=MAX_SPLIT)?;
-        within("max_memory", self.max_memory, (Excluded(0.0), Excluded(f64::INFINITY)))?;
-        within("angle", self.angle, ANGLES)?;
-        self.sample_counts()?;
-        Ok(self)
-    }
-
-    /// Samples of each level, from coarse to fine.
-    pub(super) fn sample_counts(&self) -> Result<Vec<usize>> {
-        let levels = self.levels as usize;
-        let words = self.samples.split('/').map(|word| word.trim().parse());
-        let mut counts = words.collect::<Result<Vec<usize>, _>>().unwrap_or_default();
-        let is_default = self.samples == SAMPLES;
-        // The default is made for its own number of levels; of fewer, the coarse ones are left out.
-        if is_default {
-            counts.drain(..counts.len().saturating_sub(levels));
-        }
-        let has_one_each = is_default || counts.len() == 1 || counts.len() == levels;
-        if !has_one_each || !counts.iter().all(|count| (8..=10_000).contains(count)) {
-            return Err(SimplifyError::Parameter(format!(
-                "samples = {}: give 8 to 10000 for each of {levels} levels, from coarse to fine, such \
-                 as {SAMPLES} for three, or one number for all",
-                self.samples
-            )));
-        }
-        counts.resize(levels, counts[counts.len() - 1]);
-        Ok(counts)
-    }
-
-    /// Flux at or below which a voxel is kept for an object angle in degrees.
-    pub(super) fn threshold(&self, angle: f64) -> f32 {
-        let mu = match self.variant {
-            _ if self.mu > 0.0 => self.mu,
-            Variant::Plain | Variant::Homotopy => 0.125,
-            Variant::Thinning => 0.375,
+    /// Flux at or below which a voxel is kept, and with our rules an end point, for an object angle in
+    /// degrees.
+    pub(super) fn threshold(self, angle: f64) -> f32 {
+        let mu = match self {
+            // On a sheet.
+            Self::Published => 0.5,
+            Self::Own => 0.375,
         };
         (-mu * angle.to_radians().sin()) as f32
     }
 }
 
-/// One number of samples for all levels may be given as a number.
-fn number_or_text<'de, D: serde::Deserializer<'de>>(from: D) -> Result<String, D::Error> {
-    #[derive(Deserialize)]
-    #[serde(untagged, expecting = "expected 8 to 10000 for each level, such as 70/60/50")]
-    enum Given {
-        Number(u64),
-        Text(String),
+/// The setting of a lattice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LatticeSetting {
+    /// Voxels along the longest side of the bounding box, at the finest level.
+    pub resolution: u32,
+    /// The rules.
+    pub rules: Rules,
+    /// Whether a coarse voxel is dropped if its sphere does not fit inside, as in the paper, instead of
+    /// split.
+    pub starts_coarse: bool,
+    /// `alpha`: object angle of the thinnest sheets that are kept, in degrees, where no level has one.
+    pub angle: f64,
+    /// Limit of the memory, in megabytes.
+    pub max_megabytes: f64,
+}
+
+impl LatticeSetting {
+    /// That of all levels but the published one.
+    pub fn own(resolution: u32) -> Self {
+        Self {
+            resolution,
+            rules: Rules::Own,
+            starts_coarse: false,
+            angle: OWN_ANGLE,
+            max_megabytes: MAX_MEGABYTES,
+        }
     }
-    Ok(match Given::deserialize(from)? {
-        Given::Number(number) => number.to_string(),
-        Given::Text(text) => text,
-    })
+
+    /// The paper's.
+    pub fn published(resolution: u32) -> Self {
+        Self {
+            rules: Rules::Published,
+            starts_coarse: true,
+            angle: (PUBLISHED_FLUX / 0.5).asin().to_degrees(),
+            ..Self::own(resolution)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_lattice_of_the_requested_level_is_made() {
+        let shape = crate::test_shape("plate", 8);
+        let params = AofParams { resolution: Resolution::Voxels(40) };
+        let mut prepared = PreparedAof::new(&shape, params, &RunContext::default()).expect("valid");
+        prepared.at(Level::Published).expect("published");
+        assert!(prepared.own.is_none());
+        prepared.at(Level::Native(30.0)).expect("an angle");
+        assert!(prepared.own.is_some());
+    }
 }

@@ -6,14 +6,14 @@ use std::cmp::Reverse;
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, Sphere as Ball};
 use medial::shape::Shape;
-use medial::simplifier::{Diagnostics, Level, RunContext, SimplifyError};
+use medial::simplifier::{Diagnostics, RunContext, SimplifyError};
 use rayon::prelude::*;
 
-use super::flux::{Sphere, Surface};
+use super::flux::{Sphere, Spiral, Surface};
 use super::lattice::{Descent, Grid, LatticeVoxels, Voxel, Wanted, betti, coarse_to_fine};
 use super::output::medial_mesh;
-use super::thinning::{FACES, Order, thin};
-use super::{AofParams, AofSettings, Auto, MAX_RESOLUTION, Start, Variant};
+use super::thinning::{FACES, Until, thin};
+use super::{LatticeSetting, MAX_RESOLUTION, PUBLISHED_RESOLUTION, Resolution, Rules, SAMPLES};
 use crate::Result;
 use crate::levels::within;
 
@@ -21,13 +21,12 @@ use crate::levels::within;
 pub struct Solid<'s> {
     shape: &'s Shape,
     surface: Surface,
-    pub(super) params: AofParams,
+    pub(super) setting: LatticeSetting,
     run: RunContext,
+    /// Volume of the solid, normalised.
     volume: f64,
-    /// Area of the surface.
+    /// Area of the surface, normalised.
     area: f64,
-    /// The only angle that levels ask for, if known.
-    angle: Option<f64>,
 }
 
 impl<'s> Solid<'s> {
@@ -35,7 +34,7 @@ impl<'s> Solid<'s> {
     ///
     /// # Errors
     /// When its surface has no face.
-    pub fn new(shape: &'s Shape, params: AofParams, run: RunContext) -> Result<Self> {
+    pub fn new(shape: &'s Shape, setting: LatticeSetting, run: RunContext) -> Result<Self> {
         let surface = Surface::of(shape)?;
         let mesh = shape.mesh();
         let (mut volume, mut area) = (0.0, 0.0);
@@ -44,12 +43,12 @@ impl<'s> Solid<'s> {
             volume += a.dot(b.cross(c)) / 6.0;
             area += (b - a).cross(c - a).length() / 2.0;
         }
-        Ok(Self { shape, surface, params, run, volume, area, angle: None })
+        Ok(Self { shape, surface, setting, run, volume, area })
     }
 
     /// The lattice of a resolution.
     pub fn grid(&self, resolution: u32) -> Grid {
-        Grid::new(self.shape.mesh(), resolution, self.params.d.pow(self.params.levels - 1))
+        Grid::new(self.shape.mesh(), resolution)
     }
 
     /// Flux and distances at a resolution.
@@ -59,14 +58,13 @@ impl<'s> Solid<'s> {
     /// cancelled.
     pub fn descend(&self, resolution: u32, wanted: Wanted) -> Result<Descent> {
         self.check_resolution(resolution)?;
-        coarse_to_fine(&self.surface, self.grid(resolution), &self.params, wanted, &self.run)
+        coarse_to_fine(&self.surface, self.grid(resolution), &self.setting, wanted, &self.run)
     }
 
     fn wanted(&self) -> Wanted {
-        match (self.params.variant, self.angle) {
-            (Variant::Plain, Some(angle)) => Wanted::AtMost(self.params.threshold(angle)),
-            (Variant::Plain, None) => Wanted::Kept,
-            _ => Wanted::All,
+        match self.setting.rules {
+            Rules::Published => Wanted::AtMost(self.setting.rules.threshold(self.setting.angle)),
+            Rules::Own => Wanted::All,
         }
     }
 
@@ -75,18 +73,14 @@ impl<'s> Solid<'s> {
     /// # Errors
     /// When the run was cancelled.
     pub fn axis(&self, start: &Descent, angle: f64) -> Result<LatticeVoxels> {
-        let threshold = self.params.threshold(angle);
-        let order = match self.params.variant {
-            Variant::Plain => {
-                let mut axis = LatticeVoxels::sorted(start.grid, &start.voxels);
-                axis.voxels.retain(|voxel| voxel.flux <= threshold);
-                return Ok(axis);
-            }
-            Variant::Homotopy => Order::OutermostFirst(threshold),
-            Variant::Thinning => Order::ByFlux(threshold),
-        };
+        let threshold = self.setting.rules.threshold(angle);
+        if self.setting.rules == Rules::Published {
+            let mut axis = LatticeVoxels::sorted(start.grid, &start.voxels);
+            axis.voxels.retain(|voxel| voxel.flux <= threshold);
+            return Ok(axis);
+        }
         let mut voxels = start.voxels.clone();
-        thin(&mut voxels, order, &self.run)?;
+        thin(&mut voxels, Until::EndPoints(threshold), &self.run)?;
         Ok(LatticeVoxels::sorted(start.grid, &voxels))
     }
 
@@ -96,9 +90,8 @@ impl<'s> Solid<'s> {
     /// When the run was cancelled.
     pub fn medial_mesh(&self, axis: &LatticeVoxels) -> Result<MedialMesh> {
         let centres = axis.points();
-        let balls = if self.params.refine {
-            let counts = self.params.sample_counts()?;
-            let sphere = Sphere::new(self.params.spiral, counts[counts.len() - 1], axis.grid.side);
+        let balls = if self.setting.rules == Rules::Own {
+            let sphere = Sphere::new(Spiral::EqualArea, SAMPLES[2], axis.grid.side);
             let refined = self.surface.refine(&sphere, &centres, &self.run)?;
             refined.into_iter().map(|refined| refined.ball).collect()
         } else {
@@ -111,10 +104,11 @@ impl<'s> Solid<'s> {
     }
 }
 
-// The lattice to work at: that of the parameters, or a finer one if that loses parts of the solid.
+// The lattice to work at: that of the parameters, or with our rules a finer one if that loses parts of the
+// solid.
 //
-// Variants that keep the topology of their start set need a start set with the solid's topology and
-// without missing limbs. Lattices finer by half are tried until one has both; else the best is taken:
+// Thinning keeps the topology of its start set, which therefore needs the solid's topology and no
+// missing limbs. Lattices finer by half are tried until one has both; else the best is taken:
 // the least difference of Betti numbers, then the least loss (below), then the finest. A
 // warning names the difference or the loss.
 
@@ -127,8 +121,8 @@ pub struct Base {
     pub resolution: u32,
     /// Its flux.
     pub descent: Descent,
-    /// Betti numbers of its voxels, where the variant keeps them.
-    pub topology: Option<[u64; 3]>,
+    /// Betti numbers of its voxels; zeros with the published rules, which do not keep them.
+    pub topology: [u64; 3],
     /// The part of the surface that it loses.
     pub loss: Option<Loss>,
     /// Counts and warnings about it.
@@ -138,7 +132,7 @@ pub struct Base {
 /// A start set that was tried.
 struct TriedStart {
     resolution: u32,
-    /// Betti numbers; zeros where the variant does not keep them.
+    /// Betti numbers; zeros with the published rules, which do not keep them.
     betti: [u64; 3],
     voxels: u64,
     loss: Option<Loss>,
@@ -158,11 +152,10 @@ impl Solid<'_> {
     /// When no voxel fits into the solid; as [`Solid::descend`].
     pub fn base(&self) -> Result<Base> {
         let mut diagnostics = Diagnostics::default();
-        let requested = self.params.resolution;
+        let requested = self.setting.resolution;
         let mut descent = self.descend(requested, self.wanted())?;
         let mut start = self.tried(requested, &descent);
-        let keeps_topology = self.params.variant != Variant::Plain;
-        if keeps_topology {
+        if self.setting.rules == Rules::Own {
             start = self.faithful(start, &mut diagnostics)?;
         }
         if start.resolution != requested {
@@ -176,12 +169,8 @@ impl Solid<'_> {
             } else {
                 format!(" (and {resolution})")
             };
-            let remedy = match self.params.start {
-                Start::Coarse => "raise resolution, or set start=fine",
-                Start::Fine => "raise resolution",
-            };
             return Err(SimplifyError::Parameter(format!(
-                "resolution = {requested}{refined}: no voxel fits into the solid; {remedy}"
+                "resolution = {requested}{refined}: no voxel fits into the solid; raise resolution"
             )));
         }
         diagnostics.count("resolution", resolution as usize);
@@ -190,18 +179,14 @@ impl Solid<'_> {
             diagnostics.count(&format!("dismissed_at_level_{}", level + 1), dismissed as usize);
         }
         diagnostics.count("spheres_evaluated", tally.evaluated as usize);
-        Ok(Base {
-            resolution,
-            descent,
-            topology: keeps_topology.then_some(betti),
-            loss,
-            diagnostics,
-        })
+        Ok(Base { resolution, descent, topology: betti, loss, diagnostics })
     }
 
     fn tried(&self, resolution: u32, start: &Descent) -> TriedStart {
-        let is_plain = self.params.variant == Variant::Plain;
-        let betti = if is_plain { [0; 3] } else { betti(start.voxels.iter()) };
+        let betti = match self.setting.rules {
+            Rules::Published => [0; 3],
+            Rules::Own => betti(start.voxels.iter()),
+        };
         let loss = self.loss_of_start(start, self.accepted_loss());
         TriedStart { resolution, betti, voxels: start.tally.start, loss }
     }
@@ -209,7 +194,7 @@ impl Solid<'_> {
     /// The largest loss that is accepted, a fraction of the diagonal.
     fn accepted_loss(&self) -> f64 {
         // That of the requested lattice on finer ones too: else each would fail by its own measure.
-        LOST * self.grid(self.params.resolution).side
+        LOST * self.grid(self.setting.resolution).side
     }
 
     /// The least resolution from the requested one whose start set has the topology of the solid and
@@ -344,9 +329,8 @@ impl Solid<'_> {
         let Vec3 { x, y, z } = self.shape.normalisation().backward(place);
         diagnostics.warn(format!(
             "resolution = {resolution}: the surface at ({x:.6}, {y:.6}, {z:.6}) is {:.1} % of the \
-             diagonal away from every sphere; raise resolution or the number of spheres{}",
-            100.0 * distance,
-            if self.params.start == Start::Coarse { ", or set start=fine" } else { "" }
+             diagonal away from every sphere; raise resolution or the number of spheres",
+            100.0 * distance
         ));
     }
 }
@@ -368,13 +352,12 @@ impl Solid<'_> {
 
     /// Refuses a lattice that needs more megabytes than the limit.
     pub(super) fn check_memory(&self, resolution: u32, megabytes: f64) -> Result<()> {
-        let limit = self.params.max_memory;
+        let limit = self.setting.max_megabytes;
         if megabytes <= limit {
             return Ok(());
         }
         Err(SimplifyError::Parameter(format!(
-            "resolution = {resolution}: about {:.0} MB, above max_memory = {limit}; lower resolution \
-             or raise max_memory",
+            "resolution = {resolution}: about {:.0} MB, above the limit of {limit} MB; lower resolution",
             megabytes.ceil()
         )))
     }
@@ -391,7 +374,7 @@ impl Solid<'_> {
     /// The largest resolution up to the one of the parameters whose voxels fit into memory; 1 if
     /// none does.
     fn fitting_resolution(&self) -> u32 {
-        let (resolution, limit) = (self.params.resolution, self.params.max_memory);
+        let (resolution, limit) = (self.setting.resolution, self.setting.max_megabytes);
         // Not quite a cube root: the lattice is a whole number of coarse voxels.
         let estimate = f64::from(resolution) * (limit / self.megabytes(resolution)).cbrt();
         let mut fits = (estimate.ceil() as u32).clamp(1, resolution);
@@ -404,8 +387,8 @@ impl Solid<'_> {
 
 // The published level: the paper's lattice, or the finest that fits.
 //
-// Parameters set by the user are not changed. Otherwise the resolution is lowered until the voxels and
-// the medial mesh fit into memory, and a solid without a coarse voxel starts with fine ones.
+// A resolution set by the user is not changed. Otherwise it is lowered until the voxels and the medial
+// mesh fit into memory. A solid without a coarse voxel starts with fine ones.
 
 /// How often the resolution is lowered for the medial mesh.
 const MAX_LOWERINGS: usize = 4;
@@ -418,46 +401,50 @@ const AIMED_MEMORY: f64 = 0.95;
 /// As [`Solid::base`].
 pub(super) fn published<'s>(
     shape: &'s Shape,
-    settings: &AofSettings,
+    resolution: Resolution,
     run: &RunContext,
 ) -> Result<(Solid<'s>, Base)> {
-    let params = settings.at(Level::Published).validate()?;
-    let published = params.resolution;
-    let is_free = settings.resolution == Auto::Auto;
-    let mut solid = Solid::new(shape, params, run.clone())?;
-    solid.angle = Some(solid.params.angle);
-    if is_free {
-        solid.params.resolution = solid.fitting_resolution();
-    }
-    let is_fine = settings.start == Auto::Auto
-        && solid.descend(solid.params.resolution, Wanted::Places)?.tally.start == 0;
-    if is_fine {
-        solid.params.start = Start::Fine;
-    }
-    let mut base = solid.base()?;
-    for _ in 0..if is_free { MAX_LOWERINGS } else { 0 } {
-        let axis = solid.axis(&base.descent, solid.params.angle)?;
-        let share = solid.megabytes_with_output(&base, &axis) / solid.params.max_memory;
-        if share <= 1.0 {
-            break;
-        }
-        // Voxels of sheets grow with the square of the resolution.
-        let resolution = solid.params.resolution;
-        let lower = f64::from(resolution) * (AIMED_MEMORY / share).sqrt();
-        solid.params.resolution = (lower as u32).clamp(1, (resolution - 1).max(1));
-        base = solid.base()?;
-    }
-    if solid.params.resolution != published {
-        base.diagnostics.warn(format!(
-            "resolution {} instead of the published {published}: more does not fit into max_memory = {}",
-            solid.params.resolution, solid.params.max_memory
-        ));
-    }
-    if is_fine {
-        base.diagnostics
-            .warn("start=fine instead of the published coarse: the solid has no coarse voxel");
-    }
+    let setting = LatticeSetting::published(resolution.or(PUBLISHED_RESOLUTION));
+    let mut solid = Solid::new(shape, setting, run.clone())?;
+    let base = solid.published(resolution == Resolution::Auto)?;
     Ok((solid, base))
+}
+
+impl Solid<'_> {
+    /// The lattice of the published level. Its resolution may be lowered if it `is_free`.
+    pub(super) fn published(&mut self, is_free: bool) -> Result<Base> {
+        let published = self.setting.resolution;
+        if is_free {
+            self.setting.resolution = self.fitting_resolution();
+        }
+        let has_coarse = self.descend(self.setting.resolution, Wanted::Places)?.tally.start > 0;
+        self.setting.starts_coarse = has_coarse;
+        let mut base = self.base()?;
+        for _ in 0..if is_free { MAX_LOWERINGS } else { 0 } {
+            let axis = self.axis(&base.descent, self.setting.angle)?;
+            let share = self.megabytes_with_output(&base, &axis) / self.setting.max_megabytes;
+            if share <= 1.0 {
+                break;
+            }
+            // Voxels of sheets grow with the square of the resolution.
+            let resolution = self.setting.resolution;
+            let lower = f64::from(resolution) * (AIMED_MEMORY / share).sqrt();
+            self.setting.resolution = (lower as u32).clamp(1, (resolution - 1).max(1));
+            base = self.base()?;
+        }
+        if self.setting.resolution != published {
+            base.diagnostics.warn(format!(
+                "resolution {} instead of the published {published}: more does not fit into {} MB",
+                self.setting.resolution, self.setting.max_megabytes
+            ));
+        }
+        if !has_coarse {
+            base.diagnostics.warn(
+                "starts with fine voxels instead of coarse ones: the solid has no coarse voxel",
+            );
+        }
+        Ok(base)
+    }
 }
 
 // The axis with a number of voxels: a lattice as coarse as the count allows, then deletion.
@@ -497,7 +484,7 @@ impl Solid<'_> {
         count: usize,
         diagnostics: &mut Diagnostics,
     ) -> Result<LatticeVoxels> {
-        let first = self.axis(&base.descent, self.params.angle)?;
+        let first = self.axis(&base.descent, self.setting.angle)?;
         let mut search = Search {
             growth: Growth::of(&first, base.resolution),
             best: first,
@@ -517,7 +504,9 @@ impl Solid<'_> {
             base.loss
         } else {
             if found > count {
-                self.reduce_to(&mut axis, count)?;
+                let mut voxels = axis.bricks();
+                thin(&mut voxels, Until::Count(count), &self.run)?;
+                axis = LatticeVoxels::sorted(axis.grid, &voxels);
                 diagnostics.count("deleted_to_the_count", found - axis.voxels.len());
             }
             self.loss(&axis.grid, &axis.voxels, LOST * axis.grid.side)
@@ -601,33 +590,16 @@ impl Solid<'_> {
     /// The axis of a lattice; `None` where the topology or a part of the base is lost.
     fn faithful_axis(&self, resolution: u32, base: &Base) -> Result<Option<LatticeVoxels>> {
         let start = self.descend(resolution, self.wanted())?;
-        if let Some(topology) = base.topology {
-            let betti = betti(start.voxels.iter());
-            // Another topology than the base's is accepted if it is the solid's: the base may lack it.
-            if betti != topology && Some(betti) != self.shape.expected_betti() {
-                return Ok(None);
-            }
+        let betti = betti(start.voxels.iter());
+        // Another topology than the base's is accepted if it is the solid's: the base may lack it.
+        if betti != base.topology && Some(betti) != self.shape.expected_betti() {
+            return Ok(None);
         }
         let base_loss = base.loss.map_or(0.0, |loss| loss.distance);
         if self.loss_of_start(&start, WORSE * base_loss.max(self.accepted_loss())).is_some() {
             return Ok(None);
         }
-        self.axis(&start, self.params.angle).map(Some)
-    }
-
-    /// Step 4.
-    fn reduce_to(&self, axis: &mut LatticeVoxels, count: usize) -> Result<()> {
-        if self.params.variant == Variant::Plain {
-            // Most negative flux first. Stable, so ties go by place; then back to the order of places.
-            axis.voxels.sort_by(|a, b| a.flux.total_cmp(&b.flux));
-            axis.voxels.truncate(count);
-            axis.voxels.sort_unstable_by_key(Voxel::key);
-        } else {
-            let mut voxels = axis.bricks();
-            thin(&mut voxels, Order::Down(count), &self.run)?;
-            *axis = LatticeVoxels::sorted(axis.grid, &voxels);
-        }
-        Ok(())
+        self.axis(&start, self.setting.angle).map(Some)
     }
 }
 
@@ -691,5 +663,30 @@ mod tests {
             growth.correct(20, (2.0 * at(20.0)) as usize);
             assert_eq!(growth.resolution_of(2.0 * at(30.0) * (1.0 - 1e-12)), 30);
         }
+    }
+
+    #[test]
+    fn lattices_beyond_memory_are_lowered_where_free_and_refused_elsewhere() {
+        let shape = crate::test_shape("box", 8);
+        let solid = |resolution, max_megabytes| {
+            let setting = LatticeSetting { max_megabytes, ..LatticeSetting::published(resolution) };
+            Solid::new(&shape, setting, RunContext::default()).expect("faces")
+        };
+        let lowered = solid(200, 20.0).published(true).expect("a lattice").diagnostics.warnings;
+        assert!(lowered.iter().any(|w| w.contains("instead of the published 200")), "{lowered:?}");
+        for mut refused in [solid(369, 60.0), solid(10, 1e-9)] {
+            match refused.published(false).err() {
+                Some(SimplifyError::Parameter(why)) => {
+                    assert!(why.contains("above the limit"), "{why}");
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+        // The voxels fit, their medial mesh does not.
+        let solid = solid(60, 4.0);
+        let base = solid.base().expect("fits");
+        let axis = solid.axis(&base.descent, 20.0).expect("not cancelled");
+        let needed = solid.megabytes_with_output(&base, &axis);
+        assert!(needed > 4.0 && solid.check_memory(60, needed).is_err());
     }
 }

@@ -1,14 +1,12 @@
-//! Homotopic deletion of voxels in a given order.
+//! Homotopic deletion of voxels by flux.
 //!
-//! - *Outermost first* (section 6.3): voxels above the flux threshold, by distance to the surface.
-//! - *By flux*: K. Siddiqi, S. Bouix, A. Tannenbaum, S. W. Zucker, *Hamilton-Jacobi skeletons*,
-//!   International Journal of Computer Vision 48(3), 2002, doi:10.1023/A:1016376116653, section
-//!   3.3: simple voxels in a heap, the least medial first; an end point with a flux below a threshold
-//!   is never deleted.
+//! K. Siddiqi, S. Bouix, A. Tannenbaum, S. W. Zucker, *Hamilton-Jacobi skeletons*, International Journal
+//! of Computer Vision 48(3), 2002, doi:10.1023/A:1016376116653, section 3.3: simple voxels in a heap, the
+//! least medial first; an end point with a flux below a threshold is never deleted.
 //!
-//! 1. All border voxels that may be deleted are queued by key.
+//! 1. All border voxels are queued by flux, the largest first.
 //! 2. The first is taken. If it is simple and need not be kept, it is deleted, and those of its
-//!    neighbours that may be deleted and are not queued are queued.
+//!    neighbours that are not queued are queued.
 //!
 //! An *end point* ends an open curve in one of nine digital planes through it: of its eight neighbours
 //! in the plane exactly one exists, or two that touch.
@@ -36,64 +34,36 @@ use std::collections::{BTreeMap, VecDeque};
 
 use medial::simplifier::RunContext;
 
-use super::lattice::{Bricks, Place, Voxel};
+use super::lattice::{Bricks, Place};
 use crate::Result;
 
-/// The voxels that are deleted, and their order.
+/// The end of a deletion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Order {
-    /// Those with a flux above this threshold, the smallest distance first.
-    OutermostFirst(f32),
-    /// All but end points with a flux at or below this threshold, the largest flux first.
-    ByFlux(f32),
-    /// All, the largest flux first, until this number of voxels is left.
-    Down(usize),
-}
-
-impl Order {
-    fn key(self, voxel: &Voxel) -> f32 {
-        match self {
-            Self::OutermostFirst(_) => voxel.distance,
-            Self::ByFlux(_) | Self::Down(_) => -voxel.flux,
-        }
-    }
-
-    /// The range of the keys.
-    fn keys(self, voxels: &Bricks) -> [f32; 2] {
-        match self {
-            Self::OutermostFirst(_) => {
-                [0.0, voxels.iter().map(|voxel| voxel.distance).fold(0.0, f32::max)]
-            }
-            Self::ByFlux(_) | Self::Down(_) => [-1.0, 1.0],
-        }
-    }
-
-    fn may_go(self, voxel: &Voxel) -> bool {
-        !matches!(self, Self::OutermostFirst(threshold) if voxel.flux <= threshold)
-    }
-
-    fn stays(self, voxel: &Voxel, neighbourhood: u32) -> bool {
-        matches!(self, Self::ByFlux(threshold)
-            if voxel.flux <= threshold && is_end_point(neighbourhood))
-    }
+pub enum Until {
+    /// Only end points with a flux at or below this threshold are simple.
+    EndPoints(f32),
+    /// This number of voxels is left. End points go too.
+    Count(usize),
 }
 
 /// Deletes the voxels that are simple at the time they are taken from the queue.
 ///
 /// # Errors
 /// When the run was cancelled.
-pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<()> {
+pub fn thin(voxels: &mut Bricks, until: Until, run: &RunContext) -> Result<()> {
     let total = voxels.len;
-    let least = if let Order::Down(to) = order { to } else { 0 };
-    let mut queue = BucketQueue::new(order.keys(voxels));
+    let (threshold, least) = match until {
+        Until::EndPoints(threshold) => (threshold, 0),
+        Until::Count(count) => (f32::NEG_INFINITY, count),
+    };
+    let mut queue = BucketQueue::default();
     // Places in the queue, and end points that must not be queued again.
     let mut barred = voxels.no_marks();
     for voxel in voxels.iter() {
         // With all six face neighbours a voxel is not simple; a deletion next to it will queue it.
-        let surrounded = voxels.neighbourhood(voxel.place) & FACES == FACES;
-        if order.may_go(&voxel) && !surrounded {
+        if voxels.neighbourhood(voxel.place) & FACES != FACES {
             barred.set(voxel.place);
-            queue.push(order.key(&voxel), voxel.place);
+            queue.push(-voxel.flux, voxel.place);
         }
     }
     let mut steps = 0_usize;
@@ -112,7 +82,7 @@ pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<()> {
             continue;
         }
         let voxel = voxels.get(place).expect("queued voxels are there");
-        if order.stays(&voxel, neighbourhood) {
+        if voxel.flux <= threshold && is_end_point(neighbourhood) {
             barred.set(place);
             continue;
         }
@@ -121,10 +91,8 @@ pub fn thin(voxels: &mut Bricks, order: Order, run: &RunContext) -> Result<()> {
             let step = offset(bit);
             let near = [0, 1, 2].map(|axis| (i32::from(place[axis]) + step[axis]) as u16);
             let voxel = voxels.get(near).expect("a neighbour that is there");
-            if order.may_go(&voxel) {
-                barred.set(near);
-                queue.push(order.key(&voxel), near);
-            }
+            barred.set(near);
+            queue.push(-voxel.flux, near);
         }
     }
     Ok(())
@@ -237,29 +205,21 @@ pub(super) fn ones(mut bits: u32) -> impl Iterator<Item = u32> {
     })
 }
 
-/// Steps of the range of the keys.
+/// Steps of the range of the keys, -1 to 1.
 const BUCKETS: u16 = u16::MAX;
 
 /// Places in the order of their keys, the least first, and of equal keys in the order in which they
 /// came.
+#[derive(Default)]
 struct BucketQueue {
-    least: f32,
-    /// Steps for each unit of the key.
-    steps: f32,
     buckets: BTreeMap<u16, VecDeque<Place>>,
 }
 
 impl BucketQueue {
-    /// An empty queue for keys in a range; a key outside counts as the nearer end.
-    fn new([least, most]: [f32; 2]) -> Self {
-        let span = most - least;
-        let steps = if span > 0.0 { f32::from(BUCKETS) / span } else { 0.0 };
-        Self { least, steps, buckets: BTreeMap::new() }
-    }
-
+    /// Adds a place; a key outside -1 to 1 counts as the nearer end.
     fn push(&mut self, key: f32, place: Place) {
         // The cast saturates at both ends.
-        let bucket = ((key - self.least) * self.steps) as u16;
+        let bucket = ((key + 1.0) * (f32::from(BUCKETS) / 2.0)) as u16;
         self.buckets.entry(bucket).or_default().push_back(place);
     }
 
@@ -338,7 +298,7 @@ mod tests {
 
     #[test]
     fn places_leave_by_key_and_then_as_they_came() {
-        let mut queue = BucketQueue::new([-1.0, 1.0]);
+        let mut queue = BucketQueue::default();
         let mut rng = Pcg64::seed_from_u64(3);
         let mut expected: Vec<(usize, usize, Place)> = Vec::new();
         for round in 0..20_000 {

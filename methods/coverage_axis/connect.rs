@@ -9,10 +9,8 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
-use medial::geometry::trees::PointTree;
-use medial::simplifier::{Diagnostics, SimplifyError};
+use medial::simplifier::Diagnostics;
 
 use crate::Result;
 
@@ -53,60 +51,6 @@ pub(super) fn by_regions(
     let faces = initial.faces.iter().map(|face| face.map(|v| anchor_of[v as usize]));
     let faces = faces.filter(|&[a, b, c]| a != b && b != c && a != c).collect();
     Ok(MedialMesh::from_simplices(chosen, edges, faces)?)
-}
-
-/// The vertex nearest to the centre of each sphere, each vertex once, and how many spheres had to take
-/// another than the nearest.
-///
-/// # Errors
-/// When there are more spheres than vertices.
-pub(super) fn anchors(initial: &MedialMesh, chosen: &[Sphere]) -> Result<(Vec<u32>, usize)> {
-    let vertices = initial.spheres.len();
-    if chosen.len() > vertices {
-        return Err(SimplifyError::unsupported(format!(
-            "{} spheres: too many to connect on an initial medial mesh of {vertices}; request fewer, or \
-             use more samples",
-            chosen.len()
-        )));
-    }
-    let tree = PointTree::new(&initial.spheres.iter().map(|ball| ball.centre).collect::<Vec<_>>());
-    let mut is_taken = vec![false; vertices];
-    let mut moved = 0;
-    let mut anchors = Vec::with_capacity(chosen.len());
-    for ball in chosen {
-        let (mut vertex, squared) = tree.nearest(ball.centre).expect("a mesh has vertices");
-        if is_taken[vertex as usize] {
-            vertex = nearest_free(&tree, initial, &is_taken, (ball.centre, squared));
-            moved += 1;
-        }
-        is_taken[vertex as usize] = true;
-        anchors.push(vertex);
-    }
-    Ok((anchors, moved))
-}
-
-/// The nearest vertex that is free, of those farther than the nearest of all. There is one, as there are
-/// not more anchors than vertices.
-fn nearest_free(
-    tree: &PointTree,
-    initial: &MedialMesh,
-    is_taken: &[bool],
-    (place, nearest): (Vec3, f64),
-) -> u32 {
-    let mut reach = nearest.max(1e-12);
-    loop {
-        let found = tree.within(place, reach);
-        let free = found.into_iter().filter(|&v| !is_taken[v as usize]);
-        let free = free.map(|v| {
-            let squared = initial.spheres[v as usize].centre.distance_squared(place);
-            (length(squared), v)
-        });
-        if let Some((_, vertex)) = free.min() {
-            return vertex;
-        }
-        // Twice the radius: the sphere searched holds eight times the volume.
-        reach *= 4.0;
-    }
 }
 
 /// The place in `anchors` of the nearest one along edges, for every vertex; [`NO_ANCHOR`] where none is

@@ -5,7 +5,6 @@ use medial::complex::Sphere;
 use medial::simplifier::RunContext;
 use rayon::prelude::*;
 
-use super::{CoverageAxisParams, Penalty};
 use crate::Result;
 
 /// Bits of a word.
@@ -132,27 +131,17 @@ pub(super) struct Picks {
     pub uncoverable: usize,
 }
 
-/// Weights and penalty of the score.
+/// The constant part of the score.
 pub(super) struct Score {
-    uniformity: f64,
-    /// The penalty for a candidate's radius, with its weight.
+    /// Penalty of each candidate's radius: `0.1 max r / r`, as the scripts call it.
     penalties: Vec<f64>,
 }
 
 impl Score {
     /// The constant part of the score of all candidates.
-    pub fn new(spheres: &[Sphere], params: &CoverageAxisParams) -> Self {
+    pub fn new(spheres: &[Sphere]) -> Self {
         let largest = spheres.iter().map(|ball| ball.radius).fold(0.0, f64::max);
-        let mut penalties: Vec<f64> = match params.penalty {
-            Penalty::Ratio => spheres.iter().map(|ball| 0.1 * largest / ball.radius).collect(),
-            Penalty::Stand => {
-                let inverse: Vec<f64> = spheres.iter().map(|ball| 1.0 / ball.radius).collect();
-                let [scale] = Standard::of(inverse.iter().map(|&x| [x]));
-                inverse.iter().map(|&x| scale.score(x)).collect()
-            }
-        };
-        penalties.iter_mut().for_each(|penalty| *penalty *= params.centrality);
-        Self { uniformity: params.uniformity, penalties }
+        Self { penalties: spheres.iter().map(|ball| 0.1 * largest / ball.radius).collect() }
     }
 }
 
@@ -226,8 +215,7 @@ fn best(
     let free = (0..counts.len()).filter(|&ball| !is_chosen[ball]);
     let scored = free.map(|ball| {
         let distance = if is_first { 0.0 } else { nearest[ball] };
-        let value = by_count.score(f64::from(counts[ball]))
-            + score.uniformity * by_distance.score(distance)
+        let value = by_count.score(f64::from(counts[ball])) + by_distance.score(distance)
             - score.penalties[ball];
         (value, ball)
     });

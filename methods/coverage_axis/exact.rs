@@ -1,7 +1,5 @@
 //! The choice of Coverage Axis: a smallest set of balls that covers, by integer programming.
 
-use std::time::{Duration, Instant};
-
 use medial::simplifier::{RunContext, SimplifyError};
 use microlp::{
     ComparisonOp, OptimizationDirection, Problem, ResumeOptions, SolveOptions, SolveOutcome,
@@ -9,9 +7,11 @@ use microlp::{
 };
 use rayon::prelude::*;
 
-use super::CoverageAxisParams;
 use super::coverage::{Bits, Coverage, WORD, is_subset, ones, size};
 use crate::Result;
+
+/// Limit of the nodes of branch and bound.
+const MAX_NODES: usize = 10_000;
 
 /// Nodes of branch and bound between two looks at the run.
 const NODES_OF_A_SLICE: u64 = 32;
@@ -44,32 +44,26 @@ pub(super) enum End {
     Solver,
     /// The number of nodes.
     Nodes,
-    /// Time, so that another run may find another cover.
-    Time,
 }
 
 /// A smallest cover of all samples that can be covered, or the best that the limits allow.
 ///
 /// # Errors
 /// When the reduced problem is too large, or the solver fails.
-pub(super) fn cover(
-    coverage: &Coverage,
-    params: &CoverageAxisParams,
-    run: &RunContext,
-) -> Result<Cover> {
+pub(super) fn cover(coverage: &Coverage, run: &RunContext) -> Result<Cover> {
     let uncoverable = coverage.columns() - size(&coverage.coverable());
-    let reduced = reduce(coverage);
+    let reduced = reduce(coverage, run)?;
     run.step(0, 1)?;
     let entries: usize = reduced.rows.iter().map(Vec::len).sum();
     if entries > MOST_ENTRIES {
         return Err(SimplifyError::unsupported(format!(
             "{} balls and {} samples remain after all reductions, with {entries} entries: too many for an \
-             exact cover; use select=greedy, fewer samples or a smaller dilation",
+             exact cover; use select=greedy or a smaller dilation",
             reduced.balls.len(),
             reduced.rows.len(),
         )));
     }
-    let mut found = solve(&reduced, params, run)?;
+    let mut found = solve(&reduced, run)?;
     // Forced balls are in every cover of the samples that they alone cover: they raise the bound too.
     let forced = reduced.forced.len();
     found.chosen.extend(&reduced.forced);
@@ -79,7 +73,7 @@ pub(super) fn cover(
 }
 
 /// The choices that the reductions leave.
-fn solve(reduced: &Reduced, params: &CoverageAxisParams, run: &RunContext) -> Result<Cover> {
+fn solve(reduced: &Reduced, run: &RunContext) -> Result<Cover> {
     if reduced.rows.is_empty() {
         return Ok(Cover::default());
     }
@@ -99,7 +93,7 @@ fn solve(reduced: &Reduced, params: &CoverageAxisParams, run: &RunContext) -> Re
         .zip(0_u32..)
         .map(|(&ball, place)| (ball, if first.binary_search(&place).is_ok() { 1.0 } else { 0.0 }));
     options.warm_start = Some(start.collect());
-    let outcome = search(&problem, options, params, run)?;
+    let outcome = search(&problem, options, run)?;
     let stats = outcome.stats();
     let mut places: Vec<u32> = match outcome.solution() {
         None => first.clone(),
@@ -121,7 +115,6 @@ fn solve(reduced: &Reduced, params: &CoverageAxisParams, run: &RunContext) -> Re
         nodes: stats.nodes_solved as usize,
         end: match outcome.termination_reason() {
             TerminationReason::NodeLimit => End::Nodes,
-            TerminationReason::TimeLimit => End::Time,
             _ => End::Solver,
         },
         ..Cover::default()
@@ -129,26 +122,18 @@ fn solve(reduced: &Reduced, params: &CoverageAxisParams, run: &RunContext) -> Re
 }
 
 /// Branch and bound in slices of nodes, so that a run can be cancelled and still repeats.
-fn search(
-    problem: &Problem,
-    mut options: SolveOptions,
-    params: &CoverageAxisParams,
-    run: &RunContext,
-) -> Result<SolveOutcome> {
-    let began = Instant::now();
-    options.time_limit = time_left(params, began);
+fn search(problem: &Problem, options: SolveOptions, run: &RunContext) -> Result<SolveOutcome> {
     let gap = options.mip_gap;
     let mut outcome = problem.solve_with(options).map_err(failed)?;
     while outcome.termination_reason() == TerminationReason::NodeLimit {
         let nodes = outcome.stats().nodes_solved as usize;
-        run.step(nodes, params.nodes)?;
-        if nodes >= params.nodes {
+        run.step(nodes, MAX_NODES)?;
+        if nodes >= MAX_NODES {
             break;
         }
         let mut options = ResumeOptions::default();
         options.node_limit = Some(NODES_OF_A_SLICE);
         options.mip_gap = Some(gap);
-        options.time_limit = time_left(params, began);
         outcome = outcome.resume_with(options).map_err(failed)?;
     }
     Ok(outcome)
@@ -156,14 +141,6 @@ fn search(
 
 fn failed(error: microlp::Error) -> SimplifyError {
     SimplifyError::unsupported(format!("the solver of the set cover failed: {error}"))
-}
-
-/// `None` without a limit.
-fn time_left(params: &CoverageAxisParams, began: Instant) -> Option<Duration> {
-    match params.time_limit {
-        0.0 => None,
-        limit => Some(Duration::from_secs_f64(limit).saturating_sub(began.elapsed())),
-    }
 }
 
 /// A first cover: repeatedly the ball that covers most of the rest. Places in [`Reduced::balls`], ascending.
@@ -220,14 +197,16 @@ struct State {
 ///
 /// # Cost
 /// For each ball, the balls that cover its rarest sample are compared with it; for samples likewise.
-pub(super) fn reduce(coverage: &Coverage) -> Reduced {
+pub(super) fn reduce(coverage: &Coverage, run: &RunContext) -> Result<Reduced> {
     let transposed = coverage.transposed();
     let [samples_of, balls_of] = [coverage, &transposed]
         .map(|matrix| (0..matrix.rows()).map(|row| matrix.row(row).to_vec()).collect());
     let mut state = State { samples_of, balls_of, forced: Vec::new() };
     // No short circuit: each round applies all three.
-    while state.force() | state.drop_balls() | state.drop_samples() {}
-    state.finish()
+    while state.force() | state.drop_balls() | state.drop_samples() {
+        run.check()?;
+    }
+    Ok(state.finish())
 }
 
 impl State {

@@ -7,7 +7,8 @@
 //! <https://doi.org/10.1111/cgf.15143>. The formulas are those of the authors' public programs; of the
 //! papers only the abstracts were available.
 //!
-//! 1. Samples of the surface are to be covered; candidates are spheres inside (this file).
+//! 1. Samples of the surface are to be covered; candidates are the spheres of the initial medial mesh, all
+//!    inner Voronoi vertices (this file).
 //! 2. A ball inflated by `delta` covers the samples that it contains (`coverage.rs`).
 //! 3. Coverage Axis takes a smallest set of balls that covers all samples (`exact.rs`);
 //!    Coverage Axis++ one ball after the other, by its cover, its distance to those chosen, and
@@ -30,13 +31,9 @@
 //!
 //! # Deviations from the programs
 //!
-//! - Random candidates are drawn in the bounding box, not in one that is enlarged, so that more of them are
-//!   inside; their radii are distances to the surface, not to the nearest sample, which are too large.
-//! - Two spheres chosen that are nearest to one vertex of the initial mesh are an error in the authors' way
-//!   of connecting them, and happen with random candidates alone: the second takes the nearest vertex that
-//!   is free, and is counted.
-//! - A number of spheres ends the greedy choice early. Where fewer spheres cover everything, with
-//!   `size=dilation` and for exact covers, it is met by a search on `delta`.
+//! - Random candidates are left out.
+//! - A number of spheres ends the greedy choice early. Where fewer spheres cover everything, and for exact
+//!   covers, it is met by a search on `delta`.
 //! - The exact cover is sought by another solver than the authors', after reductions that keep the
 //!   optimum. Smallest covers are not unique, so the spheres are others; their number is the same where
 //!   the search ends with a proof, which the counts `cover_bound` and `spheres` show.
@@ -55,35 +52,26 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::shape::Shape;
 use medial::simplifier::{
-    Diagnostics, Level, MedialSimplifier, MethodInfo, NativeLevel, ParamFields, Params, RunContext,
-    Simplification, Simplified, SimplifyError,
+    Diagnostics, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
+    Simplified, SimplifyError,
 };
-use medial::surface::{Sampling, Side, sample};
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64;
+use medial::surface::{Sampling, sample};
 use serde::{Deserialize, Serialize};
 
 use crate::levels::{Knob, Probe, SizeSearch, level_within, some_spheres, within};
 use crate::{Prepared, Result};
 
-/// Spheres that the authors' scripts choose at most.
+/// Limit of chosen spheres in the authors' scripts.
 const PUBLISHED_PICKS: usize = 100;
+/// Limit of chosen spheres at a native level.
+const MAX_PICKS: usize = 1000;
+/// Area-uniform samples to be covered, as in the script of Coverage Axis++.
+const SAMPLES: usize = 1500;
 
-/// Collapses a medial mesh to a number of spheres, and spares some of them: a connection that another
-/// method lends, as `qmat::keeping`.
-pub type Keeping =
-    fn(&Arc<MedialMesh>, &[u32], usize, &RunContext, &mut Diagnostics) -> Result<MedialMesh>;
-
-/// Coverage Axis and Coverage Axis++ as a method; see [`method`].
-pub struct CoverageAxis {
-    info: MethodInfo,
-    keeping: Keeping,
-}
-
-/// Coverage Axis and Coverage Axis++ as a method, with the collapse for `connection=qmat`.
+/// Coverage Axis and Coverage Axis++ as a method.
 ///
 /// Supports all levels but an error bound. Memory: two bits for each candidate and sample.
-pub fn method(keeping: Keeping) -> CoverageAxis {
+pub fn method() -> Method<CoverageAxisParams> {
     let info = MethodInfo::new("coverage-axis", "Coverage Axis++")
         .seeded()
         .citation(
@@ -102,34 +90,21 @@ pub fn method(keeping: Keeping) -> CoverageAxis {
         .native(NativeLevel::larger_is_coarser("delta", "fraction of the longest side"))
         .published("delta = 0.02 of the longest side and at most 100 spheres, as in the scripts")
         .params(CoverageAxisParams::describe());
-    CoverageAxis { info, keeping }
+    Method::new(info, prepare)
 }
 
-impl MedialSimplifier for CoverageAxis {
-    fn info(&self) -> &MethodInfo {
-        &self.info
-    }
-
-    fn prepare<'s>(&self, shape: &'s Shape, params: &Params, run: &RunContext) -> Prepared<'s> {
-        let params = params.typed::<CoverageAxisParams>()?.validate()?;
-        // For all kinds of candidates, since the connection needs it.
-        let initial = shape.initial()?;
-        run.step(0, initial.spheres.len())?;
-        let instance = Instance::new(shape, &params, run.seed)?;
-        let axis = Axis {
-            score: Score::new(&instance.spheres, &params),
-            instance,
-            initial,
-            keeping: self.keeping,
-            params,
-            run: run.clone(),
-        };
-        // The inverse dilation gives more spheres when it is turned up, as a search expects of a knob.
-        let range = 1.0 / DILATIONS.end()..=1.0 / DILATIONS.start();
-        let (count, unit) = ("inverse_dilation_in_thousandths", "longest sides over the dilation");
-        let knob = Knob { count, unit, range, steps: 1e3, rate: 0.5, exponent: 1.3 };
-        Ok(Box::new(PreparedCoverage { search: SizeSearch::new(knob, run), axis }))
-    }
+fn prepare<'s>(shape: &'s Shape, params: CoverageAxisParams, run: &RunContext) -> Prepared<'s> {
+    within("dilation", params.dilation, DILATIONS)?;
+    let initial = shape.initial()?;
+    run.step(0, initial.spheres.len())?;
+    let instance = Instance::new(shape, &initial, run.seed)?;
+    let axis =
+        Axis { score: Score::new(&instance.spheres), instance, initial, params, run: run.clone() };
+    // The inverse dilation gives more spheres when it is turned up, as a search expects of a knob.
+    let range = 1.0 / DILATIONS.end()..=1.0 / DILATIONS.start();
+    let (count, unit) = ("inverse_dilation_in_thousandths", "longest sides over the dilation");
+    let knob = Knob { count, unit, range, steps: 1e3, rate: 0.5, exponent: 1.3 };
+    Ok(Box::new(PreparedCoverage { search: SizeSearch::new(knob, run), axis }))
 }
 
 /// One shape, with its candidates.
@@ -142,7 +117,6 @@ struct Axis {
     instance: Instance,
     score: Score,
     initial: Arc<MedialMesh>,
-    keeping: Keeping,
     params: CoverageAxisParams,
     run: RunContext,
 }
@@ -150,23 +124,22 @@ struct Axis {
 impl Simplification for PreparedCoverage {
     fn at(&mut self, level: Level) -> Result<Simplified> {
         let Self { axis, search } = self;
-        let CoverageAxisParams { select, size, dilation, max_iter, .. } = axis.params;
-        let by_picks = select == Select::Greedy && size == Size::Picks;
+        let CoverageAxisParams { select, dilation } = axis.params;
         let (dilation, most) = match some_spheres(level)? {
-            Level::Spheres(count) if by_picks => (dilation, count),
+            Level::Spheres(count) if select == Select::Greedy => (dilation, count),
             Level::Spheres(count) => {
                 // The search expects more spheres at larger values: it gets the inverse dilation.
-                return search.at(count, f64::recip, |value| axis.at(value.recip(), max_iter));
+                return search.at(count, f64::recip, |value| axis.at(value.recip(), MAX_PICKS));
             }
-            Level::Native(delta) => (level_within("delta", delta, DILATIONS)?, max_iter),
-            Level::Published => (dilation, max_iter.min(PUBLISHED_PICKS)),
+            Level::Native(delta) => (level_within("delta", delta, DILATIONS)?, MAX_PICKS),
+            Level::Published => (dilation, PUBLISHED_PICKS),
         };
         let Probe { mesh, diagnostics } = axis.at(dilation, most)?;
         if let Level::Spheres(count) = level
             && mesh.spheres.len() < count
         {
             // These cover everything: more spheres need a smaller dilation.
-            let most = max_iter.max(2 * count);
+            let most = MAX_PICKS.max(2 * count);
             return search.at(count, f64::recip, |value| axis.at(value.recip(), most));
         }
         let native_level = Some(dilation);
@@ -221,7 +194,7 @@ impl Axis {
     }
 
     fn exact(&self, coverage: &Coverage, diagnostics: &mut Diagnostics) -> Result<Vec<u32>> {
-        let cover = exact::cover(coverage, &self.params, &self.run)?;
+        let cover = exact::cover(coverage, &self.run)?;
         diagnostics.count("uncoverable_samples", cover.uncoverable);
         diagnostics.count("reduced_candidates", cover.reduced[0]);
         diagnostics.count("reduced_samples", cover.reduced[1]);
@@ -234,7 +207,6 @@ impl Axis {
             let how = match cover.end {
                 exact::End::Solver => "the solver's rounding",
                 exact::End::Nodes => "the number of nodes",
-                exact::End::Time => "time, so that another run may find another cover",
             };
             diagnostics.warn(format!(
                 "{reached} spheres cover, and no cover has fewer than {}: the search was ended by {how}, \
@@ -249,23 +221,9 @@ impl Axis {
     fn connected(&self, chosen: &[u32], diagnostics: &mut Diagnostics) -> Result<MedialMesh> {
         let spheres: Vec<Sphere> =
             chosen.iter().map(|&ball| self.instance.spheres[ball as usize]).collect();
-        let anchors = match &self.instance.vertices {
-            // Candidates that are vertices of the initial mesh are their own anchors.
-            Some(vertices) => chosen.iter().map(|&ball| vertices[ball as usize]).collect(),
-            None => {
-                let (anchors, moved) = connect::anchors(&self.initial, &spheres)?;
-                diagnostics.count("anchors_moved_to_a_free_vertex", moved);
-                anchors
-            }
-        };
-        match self.params.connection {
-            Connection::Geodesic => {
-                connect::by_regions(&self.initial, &anchors, spheres, diagnostics)
-            }
-            Connection::Qmat => {
-                (self.keeping)(&self.initial, &anchors, anchors.len(), &self.run, diagnostics)
-            }
-        }
+        let anchors: Vec<u32> =
+            chosen.iter().map(|&ball| self.instance.vertices[ball as usize]).collect();
+        connect::by_regions(&self.initial, &anchors, spheres, diagnostics)
     }
 }
 
@@ -289,32 +247,8 @@ medial::parameters! {
         /// Choose by score, as Coverage Axis++, or a smallest cover by branch and bound, as Coverage
         /// Axis.
         select: Select = Select::Greedy, "greedy or exact";
-        /// The candidates: all inner Voronoi vertices, the inner poles, or random inner points.
-        candidates: Candidates = Candidates::Voronoi, "voronoi, poles or random";
         /// `delta`, by which balls are inflated before they cover, where no native level is requested.
         dilation: f64 = 0.02, "fraction of the longest side";
-        /// Area-uniform samples to be covered; the script of Coverage Axis has 2000.
-        samples: usize = 1500, "samples";
-        /// Points drawn in the bounding box for candidates=random, of which those inside are kept.
-        points: usize = 500_000, "points";
-        /// `omega_u`, weight of the distance to the nearest chosen sphere.
-        uniformity: f64 = 1.0, "pure number";
-        /// `omega_c`, weight of the penalty of small radii.
-        centrality: f64 = 1.0, "pure number";
-        /// Penalty of small radii: 0.1 max r / r, as the scripts call it, or 1 / r standardised.
-        penalty: Penalty = Penalty::Ratio, "ratio or stand";
-        /// Most spheres chosen where no number is requested; the scripts have 100, as the published
-        /// level.
-        max_iter: usize = 1000, "spheres";
-        /// Meet a number of spheres by the first ones chosen, or by a search on the dilation.
-        size: Size = Size::Picks, "picks or dilation";
-        /// Connect by geodesic regions on the initial medial mesh, or by collapses that spare the
-        /// chosen spheres.
-        connection: Connection = Connection::Geodesic, "geodesic or qmat";
-        /// Limit of branch and bound for select=exact; results that it ends are repeatable.
-        nodes: usize = 10_000, "nodes";
-        /// Limit of branch and bound for select=exact; results that it ends need not be repeatable.
-        time_limit: f64 = 240.0, "seconds, 0 for none";
     }
 }
 
@@ -328,66 +262,8 @@ pub enum Select {
     Exact,
 }
 
-/// The spheres among which some are chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Candidates {
-    /// The spheres of the initial medial mesh: all inner Voronoi vertices.
-    Voronoi,
-    /// The inner polar balls of the samples of the shape.
-    Poles,
-    /// Random points inside, with their distance to the surface.
-    Random,
-}
-
-/// The penalty of small radii.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Penalty {
-    /// `0.1 max r / r`: `penalty=''` in the authors' function, as all their scripts call it.
-    Ratio,
-    /// `1 / r`, standardised: `penalty='stand'`, the default of their function.
-    Stand,
-}
-
-/// How a number of spheres is met.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Size {
-    /// The first spheres of the greedy choice; where fewer cover everything, and for the exact choice,
-    /// which has no order, a search on the dilation.
-    Picks,
-    /// A search on the dilation, until the requested number of spheres covers all samples.
-    Dilation,
-}
-
-/// How the spheres chosen are connected.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Connection {
-    /// By geodesic Voronoi regions on the initial medial mesh.
-    Geodesic,
-    /// By Q-MAT's collapses of the initial medial mesh, which spare the spheres chosen.
-    Qmat,
-}
-
 /// Dilations that mean something, in longest sides.
 const DILATIONS: RangeInclusive<f64> = 1e-4..=1.0;
-
-impl CoverageAxisParams {
-    fn validate(self) -> Result<Self> {
-        within("dilation", self.dilation, DILATIONS)?;
-        within("uniformity", self.uniformity, 0.0..=1e6)?;
-        within("centrality", self.centrality, 0.0..=1e6)?;
-        within("time_limit", self.time_limit, 0.0..=1e6)?;
-        // A row of bits for each candidate: as many samples as memory bears for a large shape.
-        within("samples", self.samples as f64, 1.0..=100_000.0)?;
-        within("points", self.points as f64, 1.0..=10_000_000.0)?;
-        within("max_iter", self.max_iter as f64, 1.0..=1e9)?;
-        within("nodes", self.nodes as f64, 1.0..=1e9)?;
-        Ok(self)
-    }
-}
 
 // ----------------------------------------------------------------------------
 // The samples to be covered, and the spheres that may cover them.
@@ -395,17 +271,14 @@ impl CoverageAxisParams {
 /// Balls below this radius, in diagonals, are dropped: their penalty would be without bound.
 const LEAST_RADIUS: f64 = 1e-9;
 
-/// Keeps the random points apart from the samples, which have the same seed.
-const STREAM: u64 = 0x636f_7665_7261_6765;
-
 /// The input of a cover, in normalised units.
 struct Instance {
     /// Samples of the surface.
     pub samples: Vec<Vec3>,
     /// Candidates.
     pub spheres: Vec<Sphere>,
-    /// The vertices of the initial medial mesh that they are, where they are such.
-    pub vertices: Option<Vec<u32>>,
+    /// For each candidate its vertex of the initial medial mesh.
+    pub vertices: Vec<u32>,
     /// How many balls were too small to be candidates.
     pub too_small: usize,
     /// The longest side of the bounding box: the unit of the dilation.
@@ -416,47 +289,22 @@ impl Instance {
     /// Draws the samples and collects the candidates of a shape.
     ///
     /// # Errors
-    /// When the initial medial mesh cannot be built, or no random point is inside.
-    pub fn new(shape: &Shape, params: &CoverageAxisParams, seed: u64) -> Result<Self> {
-        let sampling = Sampling::AreaUniform { count: params.samples, seed };
+    /// When all spheres are too small.
+    pub fn new(shape: &Shape, initial: &MedialMesh, seed: u64) -> Result<Self> {
+        let sampling = Sampling::AreaUniform { count: SAMPLES, seed };
         let samples = sample(shape.mesh(), &sampling);
         let (low, high) = shape.mesh().bounding_box().unwrap_or_default();
         let side = (high - low).max_element();
-        let all = match params.candidates {
-            Candidates::Voronoi => shape.initial()?.spheres.clone(),
-            Candidates::Poles => shape.inner_balls()?.spheres.clone(),
-            Candidates::Random => random(shape, (low, high), params.points, seed)?,
-        };
-        let places: Vec<u32> = (0..all.len() as u32)
-            .filter(|&place| all[place as usize].radius >= LEAST_RADIUS)
-            .collect();
-        let spheres: Vec<Sphere> = places.iter().map(|&place| all[place as usize]).collect();
+        let all = &initial.spheres;
+        let vertices: Vec<u32> =
+            (0..all.len() as u32).filter(|&v| all[v as usize].radius >= LEAST_RADIUS).collect();
+        let spheres: Vec<Sphere> = vertices.iter().map(|&v| all[v as usize]).collect();
         let (all, too_small) = (all.len(), all.len() - spheres.len());
         if spheres.is_empty() {
             return Err(SimplifyError::unsupported(format!(
                 "no candidate inside has a radius of {LEAST_RADIUS} diagonals or more (found {all} candidates)"
             )));
         }
-        let vertices = (params.candidates == Candidates::Voronoi).then_some(places);
         Ok(Self { samples, spheres, vertices, too_small, side })
     }
-}
-
-/// The points inside, among random ones in the bounding box, with their distances to the surface.
-fn random(
-    shape: &Shape,
-    (low, high): (Vec3, Vec3),
-    points: usize,
-    seed: u64,
-) -> Result<Vec<Sphere>> {
-    let mut random = Pcg64::seed_from_u64(seed ^ STREAM);
-    let mut points: Vec<Vec3> = (0..points)
-        .map(|_| low + (high - low) * Vec3::new(random.random(), random.random(), random.random()))
-        .collect();
-    let sides = shape.inside_test().sides(&points);
-    let mut side = sides.iter();
-    points.retain(|_| side.next() == Some(&Side::Inside));
-    let tree = shape.surface_tree()?;
-    let distances = tree.distance_batch(&points);
-    Ok(points.iter().zip(distances).map(|(&p, r)| Sphere::new(p, r)).collect())
 }

@@ -1,7 +1,7 @@
 //! The choice and the connection against their definitions.
 
-use medial::complex::{MedialMesh, betti};
 use medial::shape::ShapeOptions;
+use medial::simplifier::Params;
 use medial::{Vec3, surface};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -9,11 +9,6 @@ use rand_pcg::Pcg64;
 use super::coverage::{Picks, ones};
 use super::exact::Cover;
 use super::*;
-
-/// The published parameters, without a limit that depends on the clock.
-fn published() -> CoverageAxisParams {
-    CoverageAxisParams { time_limit: 0.0, ..Default::default() }
-}
 
 fn random_points(rng: &mut Pcg64, count: usize) -> Vec<Vec3> {
     (0..count).map(|_| Vec3::new(rng.random(), rng.random(), rng.random())).collect()
@@ -28,18 +23,13 @@ fn covers(ball: &Sphere, sample: Vec3, delta: f64) -> bool {
     sample.distance(ball.centre) < ball.radius + delta
 }
 
-fn choose(
-    spheres: &[Sphere],
-    coverage: &Coverage,
-    params: &CoverageAxisParams,
-    limit: usize,
-) -> Picks {
-    let score = Score::new(spheres, params);
+fn choose(spheres: &[Sphere], coverage: &Coverage, limit: usize) -> Picks {
+    let score = Score::new(spheres);
     coverage::choose(spheres, coverage, &score, limit, &RunContext::default()).unwrap()
 }
 
 fn exact_cover(coverage: &Coverage) -> Cover {
-    exact::cover(coverage, &published(), &RunContext::default()).unwrap()
+    exact::cover(coverage, &RunContext::default()).unwrap()
 }
 
 #[test]
@@ -61,13 +51,7 @@ fn a_bit_is_set_where_an_inflated_ball_contains_a_sample() {
 }
 
 /// The choice as its formula has it: every part of every score from nothing, in every step.
-fn by_formula(
-    samples: &[Vec3],
-    balls: &[Sphere],
-    params: &CoverageAxisParams,
-    delta: f64,
-    limit: usize,
-) -> Vec<u32> {
+fn by_formula(samples: &[Vec3], balls: &[Sphere], delta: f64, limit: usize) -> Vec<u32> {
     let standardised = |values: Vec<f64>| -> Vec<f64> {
         let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;
@@ -76,10 +60,7 @@ fn by_formula(
         values.into_iter().map(score).collect()
     };
     let largest = balls.iter().map(|ball| ball.radius).fold(0.0, f64::max);
-    let penalty = match params.penalty {
-        Penalty::Ratio => balls.iter().map(|ball| 0.1 * largest / ball.radius).collect(),
-        Penalty::Stand => standardised(balls.iter().map(|ball| 1.0 / ball.radius).collect()),
-    };
+    let penalty: Vec<f64> = balls.iter().map(|ball| 0.1 * largest / ball.radius).collect();
     let mut left = samples.to_vec();
     left.retain(|&p| balls.iter().any(|ball| covers(ball, p, delta)));
     let mut chosen: Vec<u32> = Vec::new();
@@ -106,18 +87,16 @@ fn by_formula(
 #[test]
 fn the_greedy_choice_is_that_of_the_formula() {
     let mut rng = Pcg64::seed_from_u64(2);
-    for params in [published(), CoverageAxisParams { penalty: Penalty::Stand, ..published() }] {
-        for round in 0..30 {
-            let samples = random_points(&mut rng, 20 + 7 * round);
-            let balls = random_balls(&mut rng, 2 + 3 * round);
-            let coverage = Coverage::new(&samples, &balls, 0.03);
-            let picks = choose(&balls, &coverage, &params, 1000);
-            assert_eq!(picks.chosen, by_formula(&samples, &balls, &params, 0.03, 1000));
-            assert_eq!(picks.uncovered, 0);
-            // The first few are those of a choice that ends there.
-            let few = choose(&balls, &coverage, &params, 3);
-            assert_eq!(few.chosen, picks.chosen[..few.chosen.len()]);
-        }
+    for round in 0..50 {
+        let samples = random_points(&mut rng, 20 + 7 * round);
+        let balls = random_balls(&mut rng, 2 + 3 * round);
+        let coverage = Coverage::new(&samples, &balls, 0.03);
+        let picks = choose(&balls, &coverage, 1000);
+        assert_eq!(picks.chosen, by_formula(&samples, &balls, 0.03, 1000));
+        assert_eq!(picks.uncovered, 0);
+        // The first few are those of a choice that ends there.
+        let few = choose(&balls, &coverage, 3);
+        assert_eq!(few.chosen, picks.chosen[..few.chosen.len()]);
     }
 }
 
@@ -127,7 +106,7 @@ fn uncoverable_samples_do_not_stop_a_choice() {
         [Sphere::new(Vec3::ZERO, 1.0), Sphere::new(Vec3::X, 1.0), Sphere::new(Vec3::Y, 1.0)];
     let samples = [Vec3::new(0.5, 0.0, 0.0), Vec3::splat(40.0), Vec3::splat(50.0)];
     let coverage = Coverage::new(&samples, &balls, 0.02);
-    let picks = choose(&balls, &coverage, &published(), 60);
+    let picks = choose(&balls, &coverage, 60);
     assert_eq!((picks.chosen.len(), picks.uncovered, picks.uncoverable), (1, 0, 2));
     let cover = exact_cover(&coverage);
     assert_eq!((cover.chosen.len(), cover.bound, cover.uncoverable), (1, 1, 2));
@@ -167,24 +146,6 @@ fn an_exact_cover_is_the_smallest() {
 }
 
 #[test]
-fn an_exact_cover_has_no_more_balls_than_a_greedy_one() {
-    let mut rng = Pcg64::seed_from_u64(4);
-    for round in 0..6 {
-        let samples = random_points(&mut rng, 120);
-        let balls = random_balls(&mut rng, 60 + 20 * round);
-        let coverage = Coverage::new(&samples, &balls, 0.02);
-        let cover = exact_cover(&coverage);
-        assert_covers(&coverage, &cover.chosen);
-        let greedy = choose(&balls, &coverage, &published(), 1000).chosen.len();
-        let reduced = exact::reduce(&coverage);
-        let largest = exact::largest_first(&reduced).len() + reduced.forced.len();
-        let fewest = cover.chosen.len();
-        assert_eq!(cover.bound, fewest);
-        assert!(fewest <= greedy && fewest <= largest, "{fewest}, {greedy}, {largest}");
-    }
-}
-
-#[test]
 fn a_cylinder_takes_as_many_as_their_rings_are_wide() {
     let (radius, length) = (0.2, 3.0);
     // By the golden ratio.
@@ -216,11 +177,9 @@ fn built_in(id: &str) -> Shape {
     Shape::new(id, &mesh, report, ShapeOptions::default()).unwrap()
 }
 
-fn answer(shape: &Shape, set: &[(&str, &str)], level: Level) -> Simplified {
-    let mut params = Params::none();
-    set.iter().for_each(|(key, value)| params.set(key, value));
+fn answer(shape: &Shape, level: Level) -> Simplified {
     let method = crate::find("coverage-axis").unwrap();
-    let mut prepared = method.prepare(shape, &params, &RunContext::default()).unwrap();
+    let mut prepared = method.prepare(shape, &Params::none(), &RunContext::default()).unwrap();
     let found = prepared.at(level).unwrap();
     found.mesh.check().unwrap();
     found
@@ -258,65 +217,21 @@ fn regions_are_those_of_the_nearest_anchor_along_edges() {
 }
 
 #[test]
-fn two_spheres_on_one_vertex_are_separated_and_too_many_rejected() {
-    let balls = [Vec3::ZERO, Vec3::X, 3.0 * Vec3::X].map(|c| Sphere::new(c, 0.5)).to_vec();
-    let initial = MedialMesh::from_simplices(balls, vec![[0, 1], [1, 2]], vec![]).unwrap();
-    let near = [0.1, 0.2, 0.3].map(|x| Sphere::new(x * Vec3::X, 0.5));
-    let (anchors, moved) = connect::anchors(&initial, &near).unwrap();
-    assert_eq!((anchors, moved), (vec![0, 1, 2], 2));
-    let four = [near[0]; 4];
-    assert!(connect::anchors(&initial, &four).is_err());
-}
-
-#[test]
-fn both_connections_keep_the_spheres_chosen() {
-    for id in ["bracket", "torus"] {
-        let shape = built_in(id);
-        let regions = answer(&shape, &[], Level::Published).mesh;
-        let kept = answer(&shape, &[("connection", "qmat")], Level::Published).mesh;
-        let sorted = |mesh: &MedialMesh| {
-            let bits = |s: &Sphere| (s.centre.to_array().map(f64::to_bits), s.radius.to_bits());
-            let mut all: Vec<_> = mesh.spheres.iter().map(bits).collect();
-            all.sort_unstable();
-            all
-        };
-        // Collapses may be rejected, and then leave further vertices.
-        let after = sorted(&kept);
-        assert!(sorted(&regions).iter().all(|ball| after.binary_search(ball).is_ok()), "{id}");
-        assert_eq!(betti(&kept), betti(&shape.initial().unwrap()), "{id}");
-    }
-}
-
-#[test]
 fn a_number_of_spheres_is_met_by_picks_or_by_the_dilation() {
     let shape = built_in("bracket");
-    let all = answer(&shape, &[], Level::Native(0.02));
-    let few = answer(&shape, &[], Level::Spheres(5));
+    let all = answer(&shape, Level::Native(0.02));
+    let few = answer(&shape, Level::Spheres(5));
     assert_eq!((few.mesh.spheres.len(), few.native_level), (5, Some(0.02)));
     assert_eq!(few.mesh.spheres[..], all.mesh.spheres[..5]);
     assert!(few.diagnostics.warnings.iter().any(|w| w.contains("uncovered")));
     // More than cover everything at the default dilation.
     let more = all.mesh.spheres.len() + 20;
-    for size in ["picks", "dilation"] {
-        let smaller = answer(&shape, &[("size", size)], Level::Spheres(more));
-        let reached = smaller.mesh.spheres.len();
-        assert!(reached <= more && reached * 100 >= more * 98, "{reached} for {more}");
-        assert!(smaller.native_level.unwrap() < 0.02);
-        let again = answer(&shape, &[], Level::Native(smaller.native_level.unwrap()));
-        assert_eq!(again.mesh, smaller.mesh);
-    }
-    let most = answer(&shape, &[], Level::Spheres(100_000));
+    let smaller = answer(&shape, Level::Spheres(more));
+    let reached = smaller.mesh.spheres.len();
+    assert!(reached <= more && reached * 100 >= more * 98, "{reached} for {more}");
+    assert!(smaller.native_level.unwrap() < 0.02);
+    let again = answer(&shape, Level::Native(smaller.native_level.unwrap()));
+    assert_eq!(again.mesh, smaller.mesh);
+    let most = answer(&shape, Level::Spheres(100_000));
     assert!(most.diagnostics.warnings.iter().any(|w| w.contains("instead of 100000")));
-}
-
-#[test]
-fn all_kinds_of_candidates_cover() {
-    let shape = built_in("bracket");
-    for candidates in ["voronoi", "poles", "random"] {
-        let set = [("candidates", candidates), ("points", "20000")];
-        let found = answer(&shape, &set, Level::Native(0.03));
-        assert!(found.mesh.spheres.len() > 10, "{candidates}");
-        let count = |name: &str| found.diagnostics.counts.iter().find(|c| c.0 == name).unwrap().1;
-        assert_eq!(count("uncovered_samples"), 0, "{candidates}");
-    }
 }

@@ -1,17 +1,10 @@
 //! Umbrellas and thresholds against their definitions; `tests/it/dey_zhao.rs` has the facets that are kept.
 
+use medial::Vec3;
 use medial::geometry::{CellId, Delaunay, Pole, Poles, VertexId};
-use medial::shape::ShapeOptions;
-use medial::simplifier::{Level, Simplification};
-use medial::surface;
 
 use super::*;
-
-fn shape_of(id: &str, resolution: u32) -> Shape {
-    let mesh = medial_datasets::find(id).unwrap().mesh(resolution);
-    let report = surface::validate(&mesh).unwrap();
-    Shape::new(id, &mesh, report, ShapeOptions::default()).unwrap()
-}
+use crate::test_shape;
 
 /// Of each sample the other corners of its umbrella's triangles: the dual edges that have their ends on
 /// both sides of the plane through the sample normal to its pole vector.
@@ -51,7 +44,7 @@ fn expected_umbrellas(delaunay: &Delaunay) -> Vec<Vec<[VertexId; 2]>> {
 
 #[test]
 fn umbrellas_are_the_triangles_whose_dual_edge_crosses_the_tangent_plane() {
-    let shape = shape_of("blob", 24);
+    let shape = test_shape("blob", 24);
     let delaunay = shape.delaunay().unwrap();
     let umbrellas = Umbrellas::new(&delaunay, shape.cells().unwrap().circumspheres());
     assert_eq!((umbrellas.missing(), umbrellas.flat()), (0, 0));
@@ -76,43 +69,24 @@ fn umbrellas_are_the_triangles_whose_dual_edge_crosses_the_tangent_plane() {
 #[test]
 fn a_facet_is_above_a_level_if_its_value_is() {
     for id in ["blob", "box"] {
-        let shape = shape_of(id, 20);
+        let shape = test_shape(id, 20);
         let delaunay = shape.delaunay().unwrap();
         let facets = FacetSet::of(&shape).unwrap().facets;
-        for condition in [Condition::Both, Condition::Angle, Condition::Ratio] {
-            // The paper's thresholds, and weak ones, which edges of umbrellas would pass.
-            for (theta, rho) in [(22.5, 8.0), (1e-6, 0.01)] {
-                let umbrellas = Umbrellas::new(&delaunay, shape.cells().unwrap().circumspheres());
-                let params = DeyZhaoParams { theta, rho, condition, ..DeyZhaoParams::default() };
-                let facets = Arc::clone(&facets);
-                let strength = Strength { facets, umbrellas, params, enclosed: None };
-                let facets = &strength.facets;
-                let values: Vec<f64> = (0..facets.len()).map(|f| strength.value(f)).collect();
-                // Levels between values, and values themselves.
-                let some = values.iter().copied().step_by(values.len() / 20 + 1);
-                for level in some.chain([0.0, 0.3, 1.0, 2.5, 4.0, 50.0]) {
-                    let is_above = strength.is_above(level);
-                    let wrong = (0..values.len()).find(|&f| is_above(f) != (values[f] > level));
-                    assert_eq!(wrong, None, "{id}, {params:?} at {level}");
-                }
+        // The paper's thresholds, weak ones, which edges of umbrellas would pass, and each condition alone.
+        for (theta, rho) in [(22.5, 8.0), (1e-6, 0.01), (22.5, 1e9), (89.9999, 8.0)] {
+            let umbrellas = Umbrellas::new(&delaunay, shape.cells().unwrap().circumspheres());
+            let params = DeyZhaoParams { theta, rho };
+            let facets = Arc::clone(&facets);
+            let strength = Strength { facets, umbrellas, params };
+            let facets = &strength.facets;
+            let values: Vec<f64> = (0..facets.len()).map(|f| strength.value(f)).collect();
+            // Levels between values, and values themselves.
+            let some = values.iter().copied().step_by(values.len() / 20 + 1);
+            for level in some.chain([0.0, 0.3, 1.0, 2.5, 4.0, 50.0]) {
+                let is_above = strength.is_above(level);
+                let wrong = (0..values.len()).find(|&f| is_above(f) != (values[f] > level));
+                assert_eq!(wrong, None, "{id}, {params:?} at {level}");
             }
         }
     }
-}
-
-#[test]
-fn edges_that_are_not_enclosed_are_dropped_and_counted() {
-    let shape = shape_of("bracket", 16);
-    let at = |inside: Inside| {
-        let params = DeyZhaoParams { inside, ..DeyZhaoParams::default() };
-        selection(&shape, params).unwrap().at(Level::Published).unwrap()
-    };
-    let [all, some] = [Inside::Vertices, Inside::Edge].map(at);
-    let count = |name: &str| {
-        let found = some.diagnostics.counts.iter().find(|(count, _)| count == name);
-        found.expect("a count").1
-    };
-    assert!(some.mesh.faces.len() <= all.mesh.faces.len());
-    assert_eq!(some.mesh == all.mesh, count("facets_of_edges_not_enclosed") == 0);
-    count("enclosed_edges_without_facet");
 }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::SampleLists;
 use super::edge::{Edge, Ground, NONE, Star};
-use super::{Blocking, HemParams, Inside};
+use super::{HemParams, Inside};
 use crate::Result;
 
 /// Collapses between two reports of progress.
@@ -22,7 +22,6 @@ const JOB: usize = 4096;
 /// A medial mesh under contraction.
 pub(super) struct Contraction {
     inside: Inside,
-    blocking: Blocking,
     /// The complex as it is now, with a record of the collapses.
     pub complex: CollapseComplex,
     /// The samples as they are assigned now.
@@ -73,10 +72,14 @@ struct Change {
 
 impl Contraction {
     /// Step 1: the samples of each sphere and the errors of all edges.
-    pub(super) fn new(mesh: &MedialMesh, samples: SampleLists, params: HemParams) -> Self {
+    pub(super) fn new(
+        mesh: &MedialMesh,
+        samples: SampleLists,
+        params: HemParams,
+        run: &RunContext,
+    ) -> Result<Self> {
         let mut contraction = Self {
             inside: params.inside,
-            blocking: params.blocking,
             complex: CollapseComplex::from_mesh(mesh).recording(),
             samples,
             edges: Edges::default(),
@@ -85,14 +88,14 @@ impl Contraction {
             largest: 0.0,
             tally: Tally::default(),
         };
-        contraction.evaluate_all(&mesh.edges);
-        contraction
+        contraction.evaluate_all(&mesh.edges, run)?;
+        Ok(contraction)
     }
 
-    fn evaluate_all(&mut self, all: &[[u32; 2]]) {
+    fn evaluate_all(&mut self, all: &[[u32; 2]], run: &RunContext) -> Result<()> {
         let ground = self.ground();
         let vertices = self.samples.spheres();
-        let jobs: Vec<(Vec<Edge>, u64)> = all
+        let jobs: Result<Vec<(Vec<Edge>, u64)>> = all
             .par_chunks(JOB)
             .map(|chunk| {
                 let mut star = Star::new(vertices);
@@ -102,9 +105,12 @@ impl Contraction {
                     edge.queued = edge.cost();
                     edge
                 });
-                (evaluated.collect(), star.distances)
+                let evaluated = evaluated.collect();
+                run.check()?;
+                Ok((evaluated, star.distances))
             })
             .collect();
+        let jobs = jobs?;
         // Jobs come back in order, so candidates line up with edges for any thread order.
         let edges = jobs.iter().flat_map(|(edges, _)| edges);
         let candidates = all
@@ -116,6 +122,7 @@ impl Contraction {
         self.star.distances += jobs.iter().map(|(_, distances)| distances).sum::<u64>();
         (self.queue, self.edges) = (queue, edges);
         self.tally.evaluations += all.len();
+        Ok(())
     }
 
     fn ground(&self) -> Ground<'_> {
@@ -192,7 +199,7 @@ impl Contraction {
     fn bar(&mut self, ends: [u32; 2], edge: &mut Edge) {
         let [a, b] = ends;
         edge.tested = true;
-        if self.is_blocked(ends) {
+        if !self.complex.keeps_homotopy(a, b) {
             self.tally.held_by_topology += 1;
             edge.bar(0);
             edge.bar(1);
@@ -203,19 +210,6 @@ impl Contraction {
             if self.complex.folded_face(a, b, centre).is_some() {
                 self.tally.held_by_inversion += 1;
                 edge.bar(survivor);
-            }
-        }
-    }
-
-    /// Whether the topology forbids the collapse of an edge.
-    fn is_blocked(&mut self, [a, b]: [u32; 2]) -> bool {
-        match self.blocking {
-            Blocking::Homotopy => !self.complex.keeps_homotopy(a, b),
-            Blocking::Neighbours => {
-                let of_b = self.complex.neighbours(b);
-                let common = self.complex.neighbours(a).iter().filter(|v| of_b.contains(v));
-                let sides = self.complex.opposite_sides(a).iter();
-                common.count() > sides.filter(|side| side.contains(&b)).count()
             }
         }
     }
@@ -307,7 +301,8 @@ impl Contraction {
         if edges.is_empty() {
             return "no edge is left, each sphere is a separate component".to_owned();
         }
-        let by_topology = edges.iter().filter(|&&ends| self.is_blocked(ends)).count();
+        let by_topology =
+            edges.iter().filter(|&&[a, b]| !self.complex.keeps_homotopy(a, b)).count();
         let by_inversion = edges.len() - by_topology;
         format!(
             "the link condition holds back {by_topology} of the {} edges left, to keep the topology, \

@@ -44,21 +44,16 @@
 //!
 //! *The bound is one-sided, at the samples.* It limits how far each sample is from the union, not how far
 //! the union's boundary is from the surface: where primitives no longer fill the solid, the boundary
-//! runs deep inside the solid although every sample is near some primitive. `sides=both` also bounds
-//! the distance from the boundary of the union to the surface, at some 20,000 samples. The order of
-//! the collapses stays one-sided, so a two-sided bound needs more spheres.
+//! runs deep inside the solid although every sample is near some primitive.
 //!
 //! With `inside=depth` the initial mesh often exceeds a small bound: the cones and slabs of a
-//! Voronoi medial mesh stick out of the surface between the spheres, by 0.63 % of the diagonal on the
-//! bear and 0.51 % on the dolphin. The code's default of `1e-4` presumes `inside=surface`, for which
-//! the initial mesh has no error at all. [`Level::Published`] is the code's rule: it stops before the
-//! first collapse whose local error exceeds `1e-4`. It guarantees no bound, and reports the error of
-//! the result.
+//! Voronoi medial mesh stick out of the surface between the spheres. The code's default of `1e-4` presumes
+//! `inside=surface`, for which the initial mesh has no error at all. [`Level::Published`] is the code's rule:
+//! it stops before the first collapse whose local error exceeds `1e-4`. It guarantees no bound, and reports
+//! the error of the result.
 //!
 //! The error can rise with the number of spheres. A primitive of the start that sticks out of the surface
-//! makes every collapse next to it expensive, so it stays until late: on the built-in torus the start and
-//! the result at 1,000 spheres share a two-sided error of 2.4 % at one place, and at 100 spheres, when that
-//! place is collapsed, 0.5 % is left. A start without such places has no such rise.
+//! makes every collapse next to it expensive, so it stays until late.
 //!
 //! # Laziness
 //!
@@ -78,9 +73,7 @@
 //! # Deviations from the papers
 //!
 //! - The default is `inside=depth`. `surface` hardly notices that a primitive swallows a sample, since
-//!   buried surfaces of other primitives are near it. Largest `|sigma|` at 100 spheres, over the
-//!   vertices and 50,000 more points: bear 0.65 % of the diagonal with `depth`, 4.5 % with
-//!   `surface`; dolphin 0.41 % and 1.3 %. Largest `mu`: 0.65 % and 1.1 %, 0.41 % and 0.40 %.
+//!   buried surfaces of other primitives are near it.
 //! - The authors' code requires that an edge has as many faces as its ends have common neighbours.
 //!   Here a collapse must keep the homotopy type ([`CollapseComplex::keeps_homotopy`]). The full link
 //!   condition would reject more: edges that close a hole and the void in it at once, which does not
@@ -95,12 +88,9 @@
 //! first half of the claim holds on all three models, the second on none: HEM stays below Q-MAT at
 //! 100 and at 50 spheres.
 //!
-//! On two of the three the reason is the condition that blocks collapses. With the condition of the
-//! authors' code (`blocking=neighbours`) the result agrees with the paper: the bear has 1.8 % at 100 spheres, where
-//! Q-MAT as published has 1.1 % (`topology_from=200`) and the homotopy test 0.65 %, and stops at 77;
-//! the dolphin stops at 152, at 14 %. Edges around pockets of spheres close a hole and the void in it
-//! at once, so that condition rejects them for good. On the stand-in for the octopus HEM stays below
-//! Q-MAT even so, for a reason that is not known.
+//! On two of the three the reason is the condition that blocks collapses: an earlier build with that of the
+//! authors' code agreed with the paper. Edges around pockets of spheres close a hole and the void in it at
+//! once, so that condition rejects them for good.
 //!
 //! [`CollapseComplex::keeps_homotopy`]: medial::complex::collapse::CollapseComplex::keeps_homotopy
 
@@ -116,13 +106,11 @@ use contract::{Contraction, Stop};
 use medial::Vec3;
 use medial::complex::collapse::replay;
 use medial::complex::{MedialMesh, MedialUnion};
-use medial::metrics::{EnvelopeOptions, sample_envelope};
 use medial::shape::{ContactSets, Shape, ShapeError};
 use medial::simplifier::{
     Diagnostics, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
     Simplified, SimplifyError,
 };
-use medial::surface::TriangleBvh;
 use serde::{Deserialize, Serialize};
 
 use crate::levels::{checked, some_spheres};
@@ -134,8 +122,7 @@ const PUBLISHED: f64 = 1e-4;
 /// The HEM simplifier.
 ///
 /// Supports [`Level::Spheres`], and [`Level::Native`] with a bound that holds for every sample
-/// against the whole union: one-sided, unless the parameter `sides` selects both directions. A
-/// request finer than the one before starts again from the initial mesh.
+/// against the whole union, one-sided. A request finer than the one before starts again from the initial mesh.
 ///
 /// ```
 /// use medial::shape::{Shape, ShapeOptions};
@@ -179,12 +166,8 @@ fn prepare<'s>(shape: &'s Shape, params: HemParams, run: &RunContext) -> Prepare
     run.step(0, initial.spheres.len())?;
     let mut remarks = Diagnostics::default();
     let samples = SampleLists::of_contacts(&shape.contacts(&initial, &mut remarks)?);
-    let surface = match params.sides {
-        Sides::One => None,
-        Sides::Both => Some(shape.surface_tree()?),
-    };
-    let ruler = Ruler { samples: samples.touched(), inside: params.inside, surface };
-    let contraction = Contraction::new(&initial, samples.clone(), params);
+    let ruler = Ruler { samples: samples.touched(), inside: params.inside };
+    let contraction = Contraction::new(&initial, samples.clone(), params, run)?;
     let run = run.clone();
     Ok(Box::new(PreparedHem { initial, samples, params, ruler, run, remarks, contraction }))
 }
@@ -266,13 +249,9 @@ impl PreparedHem {
         measured: usize,
     ) -> SimplifyError {
         let spheres = self.initial.spheres.len();
-        let sides = match self.params.sides {
-            Sides::One => "off a sample",
-            Sides::Both => "off a sample, or its union off the surface",
-        };
         SimplifyError::Level(format!(
             "epsilon = {epsilon} is held by none of the {measured} levels that were measured, from \
-             {spheres} spheres to {}: the best, of {} spheres, is {error:.3e} of the diagonal {sides}",
+             {spheres} spheres to {}: the best, of {} spheres, is {error:.3e} of the diagonal off a sample",
             spheres - self.contraction.complex.record().len(),
             spheres - best
         ))
@@ -285,12 +264,8 @@ impl PreparedHem {
         let error = self.ruler.error(&mesh)?;
         let mut diagnostics = self.diagnostics();
         if error > PUBLISHED {
-            let of_what = match self.params.sides {
-                Sides::One => "a sample is",
-                Sides::Both => "a sample or the boundary of its union is",
-            };
             diagnostics.warn(format!(
-                "no collapse cost more than {PUBLISHED}, as in the authors' code, but {of_what} \
+                "no collapse cost more than {PUBLISHED}, as in the authors' code, but a sample is \
                  {error:.3e} of the diagonal off the result"
             ));
         }
@@ -299,7 +274,8 @@ impl PreparedHem {
 
     fn contract(&mut self, stop: Stop, restart: bool) -> Result<()> {
         if restart {
-            self.contraction = Contraction::new(&self.initial, self.samples.clone(), self.params);
+            let Self { initial, samples, params, run, .. } = self;
+            self.contraction = Contraction::new(initial, samples.clone(), *params, run)?;
         }
         self.contraction.run_to(stop, &self.run)
     }
@@ -320,12 +296,6 @@ medial::parameters! {
         /// Error of a sample inside the union: its depth in the deepest primitive, or its distance to
         /// the nearest surface of a primitive, buried ones included.
         inside: Inside = Inside::Depth, "depth or surface";
-        /// The error that a bound covers: that at the samples, or also the distance from the boundary
-        /// of the union to the surface.
-        sides: Sides = Sides::One, "one or both";
-        /// Blocked collapses: those that change the homotopy type, or as in the authors' code those of
-        /// edges whose ends have a common neighbour without a face.
-        blocking: Blocking = Blocking::Homotopy, "homotopy or neighbours";
     }
 }
 
@@ -340,34 +310,8 @@ pub enum Inside {
     Surface,
 }
 
-/// The directions in which the error of a whole mesh is measured. The order of the collapses always
-/// uses one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Sides {
-    /// From the samples to the union, as published.
-    One,
-    /// Also from the boundary of the union to the surface.
-    Both,
-}
-
-/// The collapses that are blocked to protect the topology.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Blocking {
-    /// Those that change the homotopy type.
-    Homotopy,
-    /// Those of edges whose ends have a common neighbour that forms no face with them, as in the
-    /// authors' code.
-    Neighbours,
-}
-
 // The error of a medial mesh, and the search for the last collapse within a bound.
 
-/// Approximate number of samples on the boundary of the union.
-const ENVELOPE_SAMPLES: usize = 20_000;
-/// A point deeper than this in some primitive, in diagonals, is not on the boundary of the union.
-const MAX_BURIAL: f64 = 1e-7;
 /// Number of evenly spread states that are measured before a bound is refused.
 const SPREAD_STATES: usize = 16;
 
@@ -377,30 +321,20 @@ pub(super) struct Ruler {
     pub samples: Vec<Vec3>,
     /// The error of a sample inside the union.
     pub inside: Inside,
-    /// The surface, if the other direction counts too.
-    pub surface: Option<Arc<TriangleBvh>>,
 }
 
 impl Ruler {
-    /// The largest error of a sample against the whole union; with two sides also that of a point on
-    /// the union's boundary against the surface.
+    /// The largest error of a sample against the whole union.
     ///
     /// # Errors
     /// When the mesh has no union.
     pub(super) fn error(&self, mesh: &MedialMesh) -> Result<f64> {
         let union = MedialUnion::new(mesh).map_err(unsupported)?;
-        let at_samples = sample_error(mesh, &union, &self.samples, self.inside)?;
-        let Some(surface) = &self.surface else {
-            return Ok(at_samples);
-        };
-        let options = EnvelopeOptions { samples: ENVELOPE_SAMPLES, burial: MAX_BURIAL, seed: 0 };
-        let boundary = sample_envelope(mesh, &union, &options).map_err(unsupported)?;
-        let nearest = surface.closest_batch(&boundary);
-        Ok(nearest.iter().map(|n| n.distance).fold(at_samples, f64::max))
+        sample_error(mesh, &union, &self.samples, self.inside)
     }
 }
 
-/// For meshes without a union, and unions without a boundary.
+/// For meshes without a union.
 fn unsupported(error: impl Error) -> SimplifyError {
     SimplifyError::unsupported(error.to_string())
 }

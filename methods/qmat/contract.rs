@@ -15,7 +15,10 @@ use crate::Result;
 /// Collapses between two reports of progress.
 const REPORT_EVERY: usize = 4096;
 
-/// Stars of at least this many edges are evaluated in parallel.
+/// Ratio of the smallest to the largest eigenvalue at which a quadric counts as singular.
+pub(super) const SINGULAR_RATIO: f64 = 1e-10;
+
+/// Number of edges from which on a star is evaluated in parallel.
 const LARGE_STAR: usize = 2048;
 
 /// A medial mesh under contraction.
@@ -25,45 +28,8 @@ pub(super) struct Contraction {
     pub complex: CollapseComplex,
     quadrics: Vec<Quadric>,
     queue: CollapseQueue,
-    /// Spheres that stay as they are; none where the vector is empty.
-    kept: Kept,
     skipped: Skipped,
     pub tally: Tally,
-}
-
-/// Spheres that stay as they are.
-#[derive(Clone, Debug, Default)]
-struct Kept(Vec<bool>);
-
-/// Where an edge may be collapsed to.
-enum Freedom {
-    Anywhere,
-    /// Onto the end that is kept.
-    Onto(Sphere),
-    /// Both ends are kept.
-    Nowhere,
-}
-
-impl Kept {
-    fn has(&self, v: u32) -> bool {
-        self.0.get(v as usize).copied().unwrap_or(false)
-    }
-
-    fn freedom(&self, complex: &CollapseComplex, [a, b]: [u32; 2]) -> Freedom {
-        match (self.has(a), self.has(b)) {
-            (false, false) => Freedom::Anywhere,
-            (true, false) => Freedom::Onto(complex.sphere(a)),
-            (false, true) => Freedom::Onto(complex.sphere(b)),
-            (true, true) => Freedom::Nowhere,
-        }
-    }
-
-    /// The merged sphere goes by the id `kept` from now on.
-    fn merge(&mut self, kept: u32, removed: u32) {
-        if self.has(removed) {
-            self.0[kept as usize] = true;
-        }
-    }
 }
 
 /// Counts of popped candidates by outcome.
@@ -130,14 +96,6 @@ impl Folded {
 impl Contraction {
     /// Steps 1 and 2: quadrics of all spheres, costs of all edges.
     pub(super) fn new(mesh: &MedialMesh, params: QmatParams) -> Self {
-        Self::keeping(mesh, params, &[])
-    }
-
-    /// As [`Contraction::new`]; the `kept` spheres stay as they are, and a sphere merged with one becomes it.
-    pub(super) fn keeping(mesh: &MedialMesh, params: QmatParams, kept: &[u32]) -> Self {
-        let mut marks = vec![false; if kept.is_empty() { 0 } else { mesh.spheres.len() }];
-        kept.iter().for_each(|&v| marks[v as usize] = true);
-        let kept = Kept(marks);
         let complex = CollapseComplex::from_mesh(mesh);
         // The oracle of the tests replays the collapses.
         #[cfg(test)]
@@ -147,19 +105,17 @@ impl Contraction {
             .edges
             .par_iter()
             .with_min_len(LARGE_STAR)
-            .filter_map(|&ends| candidate(&complex, &quadrics, &params, &kept, ends))
+            .map(|&ends| candidate(&complex, &quadrics, &params, ends))
             .collect();
         let queue = CollapseQueue::from_candidates(candidates);
-        Self { params, complex, quadrics, queue, kept, skipped, tally: Tally::default() }
+        Self { params, complex, quadrics, queue, skipped, tally: Tally::default() }
     }
 
     /// All edges left, the cheapest first.
     pub(super) fn sorted_candidates(&self) -> Vec<Candidate> {
         let edges = self.complex.edges();
         let mut all: Vec<_> = edges
-            .filter_map(|ends| {
-                candidate(&self.complex, &self.quadrics, &self.params, &self.kept, ends)
-            })
+            .map(|ends| candidate(&self.complex, &self.quadrics, &self.params, ends))
             .collect();
         all.sort_by(Candidate::order);
         all
@@ -228,14 +184,8 @@ impl Contraction {
     pub(super) fn place(&self, candidate: Candidate) -> Decision {
         let [a, b] = candidate.ends();
         let mut faces = Folded::default();
-        if let Freedom::Onto(sphere) = self.kept.freedom(&self.complex, [a, b]) {
-            return match faces.holds(&self.complex, [a, b], sphere) {
-                true => Decision::Fold(faces),
-                false => Decision::Collapse(sphere),
-            };
-        }
         let (quadric, ends) = edge_quadric(&self.complex, &self.quadrics, [a, b]);
-        let optimum = minimise(&quadric, ends, self.params.singular_ratio);
+        let optimum = minimise(&quadric, ends);
         if !faces.holds(&self.complex, [a, b], optimum) {
             return Decision::Collapse(optimum);
         }
@@ -257,21 +207,20 @@ impl Contraction {
     /// Step 5: the collapse, the sum of the quadrics, new costs for the edges of the merged sphere,
     /// whose id is returned.
     fn merge(&mut self, [a, b]: [u32; 2], sphere: Sphere) -> u32 {
-        let Self { params, complex, quadrics, queue, kept: marks, tally, .. } = self;
+        let Self { params, complex, quadrics, queue, tally, .. } = self;
         // Rename the smaller star, so that a growing hub is not rewritten at every collapse.
         let [of_a, of_b] = [a, b].map(|v| complex.neighbours(v).len());
         let [kept, removed] = if of_a >= of_b { [a, b] } else { [b, a] };
         complex.collapse(kept, removed, sphere);
-        marks.merge(kept, removed);
         let gone = quadrics[removed as usize];
         quadrics[kept as usize] += &gone;
         let around = complex.neighbours(kept);
         // Both branches push in the order of the neighbours: results do not depend on threads.
-        let renewed = |&v: &u32| candidate(complex, quadrics, params, marks, [kept, v]);
+        let renewed = |&v: &u32| candidate(complex, quadrics, params, [kept, v]);
         if around.len() < LARGE_STAR {
-            around.iter().filter_map(renewed).for_each(|candidate| queue.push(candidate));
+            around.iter().map(renewed).for_each(|candidate| queue.push(candidate));
         } else {
-            let candidates: Vec<_> = around.par_iter().filter_map(renewed).collect();
+            let candidates: Vec<_> = around.par_iter().map(renewed).collect();
             candidates.into_iter().for_each(|candidate| queue.push(candidate));
         }
         queue.wake(complex, kept);
@@ -306,43 +255,31 @@ impl Contraction {
             return "no edge is left, each sphere is a separate component".to_owned();
         }
         let keeps_topology = self.keeps_topology();
-        let (mut by_choice, mut by_topology, mut by_inversion) = (0, 0, 0);
+        let (mut by_topology, mut by_inversion) = (0, 0);
         for &[a, b] in &edges {
-            if self.kept.has(a) && self.kept.has(b) {
-                by_choice += 1;
-            } else if keeps_topology && !self.complex.keeps_homotopy(a, b) {
+            if keeps_topology && !self.complex.keeps_homotopy(a, b) {
                 by_topology += 1;
             } else {
                 by_inversion += 1;
             }
         }
-        let both_kept = match by_choice {
-            0 => String::new(),
-            count => format!("; {count} join two kept spheres"),
-        };
         format!(
             "the link condition holds back {by_topology} of the {} edges left, to keep the topology, \
-             and {by_inversion} would fold a face over{both_kept}",
+             and {by_inversion} would fold a face over",
             edges.len()
         )
     }
 }
 
-/// The edge at the cost of its best placement; `None` where both ends are kept.
+/// The edge at the cost of its best placement.
 fn candidate(
     complex: &CollapseComplex,
     quadrics: &[Quadric],
     params: &QmatParams,
-    kept: &Kept,
     ends: [u32; 2],
-) -> Option<Candidate> {
+) -> Candidate {
     let (quadric, spheres) = edge_quadric(complex, quadrics, ends);
-    let best = match kept.freedom(complex, ends) {
-        Freedom::Anywhere => minimise(&quadric, spheres, params.singular_ratio),
-        Freedom::Onto(sphere) => sphere,
-        Freedom::Nowhere => return None,
-    };
-    Some(priced(complex, params, ends, quadric.value(best)))
+    priced(complex, params, ends, quadric.value(minimise(&quadric, spheres)))
 }
 
 /// The edge with the cost `(E + k) Γ²` (equation 8); equal costs are ordered by `E`.
@@ -376,9 +313,9 @@ fn edge_quadric(
 
 /// The sphere of least error (equation 6 and below): the minimiser; the midpoint if the minimiser has
 /// a negative radius; the best of both ends and the midpoint if there is no minimiser within reach.
-fn minimise(quadric: &Quadric, ends: [Sphere; 2], singular_ratio: f64) -> Sphere {
+fn minimise(quadric: &Quadric, ends: [Sphere; 2]) -> Sphere {
     let midpoint = ends[0].lerp(ends[1], 0.5);
-    match quadric.minimiser(singular_ratio) {
+    match quadric.minimiser(SINGULAR_RATIO) {
         Some(sphere) if is_in_reach(sphere, midpoint, ends) => {
             if sphere.radius < 0.0 {
                 midpoint
@@ -440,9 +377,7 @@ impl Contraction {
         initial: &MedialMesh,
         run: &RunContext,
     ) -> Result<Option<Cluster>> {
-        // A cluster may hold several kept spheres.
-        let is_tied = !self.kept.0.is_empty() || !self.keeps_topology();
-        if is_tied || self.complex.sphere_count() > MAX_UNLOCKED_SPHERES {
+        if !self.keeps_topology() || self.complex.sphere_count() > MAX_UNLOCKED_SPHERES {
             return Ok(None);
         }
         // Computed on demand: few runs get here.

@@ -22,16 +22,13 @@
 //!
 //! # Where the paper is silent
 //!
-//! - "Invertible" means that the smallest eigenvalue of `A` is above `singular_ratio` times the
-//!   largest, which depends neither on scale nor on the number of summed quadrics.
+//! - "Invertible" means that the smallest eigenvalue of `A` is above `1e-10` times the largest, which depends neither on scale nor on the number of summed quadrics.
 //! - A minimiser with a negative radius is replaced by the midpoint of the edge.
 //! - Equal costs, mostly the zeros of contained spheres, are ordered by `E`, then by ids.
 //! - Centres closer than `1e-12` are one point: `Γ` and the cost are 0, and they go first, small
 //!   stars before large ones.
 //! - A face whose balls have no common outer tangent plane, or whose centres are collinear, adds
 //!   no slab, and a lone edge with one ball inside the other no cone. Both are counted.
-//! - `boundary=legacy` follows the authors' code in the weight and the length of the normals of the
-//!   boundary planes, and in nothing else.
 //!
 //! # Deviations from the paper
 //!
@@ -104,33 +101,6 @@ pub fn method() -> Method<QmatParams> {
         )
         .params(QmatParams::describe());
     Method::new(info, prepare)
-}
-
-/// Collapses a medial mesh to `target` spheres by Q-MAT's defaults, and spares those in `kept`: a sphere
-/// merged with one becomes it, and two of them are never merged. This connects spheres that another
-/// method has chosen; it is mode 2 of the public program Net-Maker/QMAT.
-///
-/// # Errors
-/// When the run is cancelled, or a placement is not valid.
-pub fn keeping(
-    initial: &Arc<MedialMesh>,
-    kept: &[u32],
-    target: usize,
-    run: &RunContext,
-    diagnostics: &mut Diagnostics,
-) -> Result<MedialMesh> {
-    let params = QmatParams::default().at(Level::Spheres(target));
-    let mut contraction = Contraction::keeping(initial, params, kept);
-    contraction.run_to(initial, target, run)?;
-    contraction.diagnose(diagnostics);
-    let reached = contraction.complex.sphere_count();
-    if reached > target {
-        let why = contraction.why_stopped();
-        diagnostics.warn(format!("{reached} spheres instead of {target} are left: {why}"));
-    }
-    let mesh = contraction.complex.to_mesh();
-    mesh.check()?;
-    Ok(mesh)
 }
 
 fn prepare<'s>(shape: &'s Shape, params: QmatParams, run: &RunContext) -> Prepared<'s> {
@@ -209,29 +179,12 @@ medial::parameters! {
     pub struct QmatParams {
         /// `k` of equation 8, added to the error of every edge: the larger, the earlier spikes go.
         k: f64 = 1e-5, "squared fraction of the diagonal";
-        /// Planes that keep stable boundaries from shrinking (section 4.4).
-        boundary: Boundary = Boundary::Paper, "paper, legacy or none";
-        /// `k'` of section 4.4, the weight of the boundary planes.
+        /// `k'` of section 4.4, the weight of the planes that keep stable boundaries from shrinking.
         k_boundary: f64 = 0.1, "pure number";
         /// From this sphere count on a collapse has to keep the topology (section 4.5). `all` is from
         /// the start, 200 is the paper's, `auto` is 200 at the published level and `all` at others.
         topology_from: TopologyFrom = TopologyFrom::Auto, "spheres, or all, never or auto";
-        /// Ratio of the smallest to the largest eigenvalue at which a quadric counts as singular; not
-        /// in the paper.
-        singular_ratio: f64 = 1e-10, "pure number in [0, 1)";
     }
-}
-
-/// How stable boundaries of the medial mesh are kept from shrinking.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Boundary {
-    /// Section 4.4: planes with unit normals, weighted by `k' Γ²`.
-    Paper,
-    /// The authors' code: a tenth of that weight, and normals as long as the edge.
-    Legacy,
-    /// No boundary planes.
-    None,
 }
 
 /// From which sphere count on a collapse has to satisfy the link condition.
@@ -282,7 +235,6 @@ impl QmatParams {
     fn validate(self) -> Result<Self> {
         within("k", self.k, 0.0..f64::INFINITY)?;
         within("k_boundary", self.k_boundary, 0.0..f64::INFINITY)?;
-        within("singular_ratio", self.singular_ratio, 0.0..1.0)?;
         Ok(self)
     }
 }

@@ -11,7 +11,7 @@ use medial::complex::collapse::CollapseComplex;
 use medial::complex::{MedialMesh, Sphere, ZERO_LENGTH, stability_ratio};
 use medial::geometry::{Cone, ConeFrame, SlabPlanes};
 
-use super::{Boundary, QmatParams};
+use super::QmatParams;
 
 /// The function `E`, in exactly two cache lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -330,10 +330,9 @@ fn add_cone(quadrics: &mut [Quadric], mesh: &MedialMesh, ends: [u32; 2]) -> bool
 fn add_tip(quadrics: &mut [Quadric], mesh: &MedialMesh, end: u32, other: u32, params: &QmatParams) {
     let [tip, base] = [end, other].map(|v| mesh.spheres[v as usize]);
     // Without an axis the stability ratio is 0, and so is the weight.
-    if let (Some(frame), Some((weight, length))) =
-        (cone_frame(base, tip), k_boundary(tip, base, params))
-    {
-        quadrics[end as usize].add_plane(frame.u * length, tip, weight);
+    if let Some(frame) = cone_frame(base, tip) {
+        let weight = boundary_weight(tip, base, params);
+        quadrics[end as usize].add_plane(frame.u, tip, weight);
     }
 }
 
@@ -346,15 +345,13 @@ fn add_rim(
     params: &QmatParams,
 ) {
     let [a, b] = ends.map(|v| mesh.spheres[v as usize]);
-    let Some((weight, length)) = k_boundary(a, b, params) else {
-        return;
-    };
     if cone_frame(a, b).is_none() {
         return;
     }
     if let Some(normal) = boundary_edge_normal([a, b], mesh.spheres[apex as usize]) {
+        let weight = boundary_weight(a, b, params);
         for v in ends {
-            quadrics[v as usize].add_plane(normal * length, a, weight);
+            quadrics[v as usize].add_plane(normal, a, weight);
         }
     }
 }
@@ -389,13 +386,8 @@ fn cone_frame(a: Sphere, b: Sphere) -> Option<ConeFrame> {
     Cone::new(a, b).frame()
 }
 
-/// Weight of a boundary plane and length of its normal.
-fn k_boundary(a: Sphere, b: Sphere, params: &QmatParams) -> Option<(f64, f64)> {
+/// Weight of a boundary plane.
+fn boundary_weight(a: Sphere, b: Sphere, params: &QmatParams) -> f64 {
     let stability = stability_ratio(a, b);
-    let weight = params.k_boundary * stability * stability;
-    match params.boundary {
-        Boundary::Paper => Some((weight, 1.0)),
-        Boundary::Legacy => Some((0.1 * weight, a.centre.distance(b.centre))),
-        Boundary::None => None,
-    }
+    params.k_boundary * stability * stability
 }

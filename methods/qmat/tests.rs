@@ -5,14 +5,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use medial::Vec3;
 use medial::complex::collapse::CollapseComplex;
 use medial::complex::{MedialMesh, Sphere, betti};
-use medial::simplifier::{RunContext, SimplifyError};
+use medial::simplifier::RunContext;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::contract::Contraction;
+use super::contract::{Contraction, SINGULAR_RATIO};
 use super::quadric::Quadric;
-use super::{Boundary, QmatParams, *};
+use super::{QmatParams, *};
 
 fn params() -> QmatParams {
     QmatParams::default()
@@ -60,7 +60,7 @@ fn slabs_of_one_affine_plane_collapse_without_error() {
     let on_plane = |c: Vec3| (c.z - 0.2 * c.x - 0.1 * c.y).abs();
     let radius = |x: f64, y: f64| 0.1 + 0.3 * x - 0.05 * y;
     let initial = grid(9, |x, y| (0.2 * x + 0.1 * y, radius(x, y)));
-    let no_boundary = QmatParams { boundary: Boundary::None, ..params() };
+    let no_boundary = QmatParams { k_boundary: 0.0, ..params() };
     for target in [60, 20, 5] {
         let (mesh, contraction) = contract(&initial, no_boundary, target);
         assert_eq!(mesh.spheres.len(), target);
@@ -80,11 +80,11 @@ fn stable_boundaries_stay_where_they_are() {
         let doubled = |f: &[u32; 3]| (at(f[1]) - at(f[0])).cross(at(f[2]) - at(f[0])).length();
         mesh.faces.iter().map(doubled).sum::<f64>() / 2.0
     };
-    let shrunk = |boundary| {
-        let (mesh, _) = contract(&initial, QmatParams { boundary, ..params() }, 8);
+    let shrunk = |k_boundary| {
+        let (mesh, _) = contract(&initial, QmatParams { k_boundary, ..params() }, 8);
         1.0 - area(&mesh)
     };
-    let [paper, none] = [Boundary::Paper, Boundary::None].map(shrunk);
+    let [paper, none] = [0.1, 0.0].map(shrunk);
     assert!(paper.abs() < 0.05, "{paper}");
     assert!(paper < 0.2 * none, "{paper} {none}");
 }
@@ -253,8 +253,8 @@ fn order_placement_and_fallback_are_those_of_the_paper_by_brute_force() {
         let edges = (0..n / 3).map(|_| distinct()).map(|[a, b, _]| [a, b]).collect();
         let initial = MedialMesh::from_simplices(spheres, edges, faces).unwrap();
         let topology_from = [TopologyFrom::Never, TopologyFrom::All][round / 2 % 2];
-        let boundary = [Boundary::Paper, Boundary::None][round % 2];
-        let params = QmatParams { topology_from, boundary, ..params() };
+        let k_boundary = [0.1, 0.0][round % 2];
+        let params = QmatParams { topology_from, k_boundary, ..params() };
         totals.iter_mut().zip(follow(&initial, params)).for_each(|(all, n)| *all += n);
     }
     for (bumps, topology_from) in [6, 8, 11]
@@ -548,10 +548,7 @@ impl Oracle {
         if s.abs() >= 1.0 {
             return;
         }
-        let weight = match self.params.boundary {
-            Boundary::Paper => self.params.k_boundary * stability(m, n).powi(2),
-            _ => 0.0,
-        };
+        let weight = self.params.k_boundary * stability(m, n).powi(2);
         let around: Vec<[u32; 3]> =
             self.faces.iter().filter(|f| f.contains(&a) && f.contains(&b)).copied().collect();
         match around.as_slice() {
@@ -604,7 +601,7 @@ impl Oracle {
         let is_near = |s: &Sphere| {
             s.centre.distance(middle.centre) <= reach && (s.radius - middle.radius).abs() <= reach
         };
-        match error.minimiser(self.params.singular_ratio).filter(is_near) {
+        match error.minimiser(SINGULAR_RATIO).filter(is_near) {
             Some(sphere) if sphere.radius < 0.0 => middle,
             Some(sphere) => sphere,
             None => self.three([a, b], error)[0],
@@ -720,24 +717,4 @@ enum Placed {
 fn sorted<const N: usize>(mut simplex: [u32; N]) -> [u32; N] {
     simplex.sort_unstable();
     simplex
-}
-
-#[test]
-fn the_search_for_unlocked_edges_ends_when_cancelled() {
-    let mesh = medial_datasets::find("torus").expect("in the catalogue").mesh(24);
-    let report = medial::surface::validate(&mesh).expect("a solid");
-    let shape = Shape::new("torus", &mesh, report, medial::shape::ShapeOptions::default());
-    let shape = shape.expect("an extent");
-    let initial = shape.initial().expect("samples that span space");
-    let mut contraction = Contraction::new(&initial, QmatParams::default());
-    let run = RunContext::default();
-    contraction.run_to(&initial, 100, &run).expect("not cancelled");
-    assert!(contraction.unlock(&initial, &run).is_ok());
-    run.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
-    let cancelled = |outcome| matches!(outcome, Err(SimplifyError::Cancelled));
-    assert!(cancelled(contraction.unlock(&initial, &run).map(|_| ())));
-    // Not only at each 4096th collapse.
-    let before = contraction.complex.sphere_count();
-    assert!(cancelled(contraction.run_to(&initial, 10, &run)));
-    assert_eq!(contraction.complex.sphere_count(), before);
 }

@@ -2,7 +2,7 @@
 
 use medial::Vec3;
 use medial::complex::collapse::CollapseComplex;
-use medial::complex::{CellSpheres, Contacts, Incidence, MedialMesh, Sphere, UnionAxis, betti};
+use medial::complex::{CellSpheres, Incidence, MedialMesh, Sphere, UnionAxis, betti};
 use medial::geometry::predicates::{Sign, orient3d};
 use medial::geometry::{CellId, Delaunay};
 use medial::metrics::enclosed_volume;
@@ -12,9 +12,15 @@ use medial::surface::TriangleBvh;
 use rayon::prelude::*;
 
 use super::parts::without_fins;
-use super::{AxisChoice, TamHeidrichParams};
 use crate::Result;
 use crate::levels::perturbed;
+
+/// Factor of the radii of polar balls, so that balls that touch in a sample overlap.
+const RADIUS_FACTOR: f64 = 1.002;
+/// Largest displacement of a polar ball along each axis, in radii.
+const JITTER: f64 = 1e-7;
+/// Distance of two vertices of the axis, in radii, up to which they are merged.
+const MERGE: f64 = 1e-3;
 
 /// A medial mesh with everything that pruning needs.
 pub(super) struct Axis {
@@ -49,30 +55,19 @@ impl Axis {
         Self { mesh, incidence, on_curve, at_sphere, at_face, b2: 0 }
     }
 
-    /// The axis of a shape, as the parameters specify it.
+    /// The axis of a shape: its given medial mesh, or else that of the union of the polar balls.
     pub(super) fn of_shape(
         shape: &Shape,
-        params: &TamHeidrichParams,
         run: &RunContext,
         diagnostics: &mut Diagnostics,
     ) -> Result<Self> {
         let given = shape.has_given_initial();
-        let from_union = match params.axis {
-            AxisChoice::Auto => !given,
-            AxisChoice::Union => true,
-            AxisChoice::Initial => false,
-        };
-        let mut axis = match from_union {
-            true => of_union(shape, params, run, diagnostics)?,
-            false => {
-                let mesh = shape.initial()?;
-                let mut axis = Self::of_mesh(mesh.as_ref().clone());
-                axis.b2 = betti(&axis.mesh)[2];
-                if let Some(contacts) = mesh.contacts.as_ref().filter(|_| !given) {
-                    axis.at_sphere = volumes(contacts, 0..contacts.of_sphere.len());
-                }
-                axis
-            }
+        let mut axis = if given {
+            let mut axis = Self::of_mesh(shape.initial()?.as_ref().clone());
+            axis.b2 = betti(&axis.mesh)[2];
+            axis
+        } else {
+            of_union(shape, run, diagnostics)?
         };
         run.step(0, 1)?;
         if given {
@@ -117,18 +112,10 @@ impl Axis {
 }
 
 /// The exact axis of the union of the perturbed balls.
-fn of_union(
-    shape: &Shape,
-    params: &TamHeidrichParams,
-    run: &RunContext,
-    diagnostics: &mut Diagnostics,
-) -> Result<Axis> {
-    let poles = match shape.has_given_initial() {
-        true => DistinctBalls::given(&shape.inner_balls()?.spheres),
-        false => DistinctBalls::of_samples(shape)?,
-    };
+fn of_union(shape: &Shape, run: &RunContext, diagnostics: &mut Diagnostics) -> Result<Axis> {
+    let poles = DistinctBalls::of_samples(shape)?;
     run.step(0, 1)?;
-    let spheres = perturbed(&poles.balls, params.radius_factor, params.jitter, run.seed);
+    let spheres = perturbed(&poles.balls, RADIUS_FACTOR, JITTER, run.seed);
     let union = UnionAxis::of_balls(&spheres).map_err(ShapeError::from)?;
     run.step(0, 1)?;
     let whole = union.mesh();
@@ -136,7 +123,7 @@ fn of_union(
     let is_fin = fins_of(&whole, &union, &at);
     let (finless, first_into, fins_left) = without_fins(&whole, &is_fin);
     run.step(0, 1)?;
-    let (mesh, into) = merged(&finless, params.merge, run)?;
+    let (mesh, into) = merged(&finless, MERGE, run)?;
     let mut axis = Axis::of_mesh(mesh);
     // The first vertices of the axis are centres of balls.
     for (&ball, &vertex) in union.balls().iter().zip(&first_into) {
@@ -176,13 +163,6 @@ fn fins_of(mesh: &MedialMesh, union: &UnionAxis, at: &[Option<u32>]) -> Vec<bool
     mesh.faces.iter().map(|face| fins.binary_search(face).is_ok()).collect()
 }
 
-/// The volumes of the Delaunay tetrahedra of some poles.
-fn volumes(contacts: &Contacts, poles: impl Iterator<Item = usize>) -> Vec<f64> {
-    poles
-        .map(|pole| tetrahedron(contacts.of_sphere[pole].map(|s| contacts.samples[s as usize])))
-        .collect()
-}
-
 // ----------------------------------------------------------------------------
 // Step 1, section 3: merges vertices of the axis that are still nearly at one position.
 //
@@ -190,7 +170,7 @@ fn volumes(contacts: &Contacts, poles: impl Iterator<Item = usize>) -> Vec<f64> 
 // corners there, and the axis several vertices where the exact one has one. Those are merged by their
 // distance. On a box sampled on a grid the distances have a gap, on curved shapes there is none.
 //
-// 1. Take the edges not longer than `merge` times the smaller radius of their ends, the shortest first.
+// 1. Take the edges not longer than [`MERGE`] times the smaller radius of their ends, the shortest first.
 // 2. Contract each to its first end, centres of balls being first, if that keeps the homotopy type
 //    ([`CollapseComplex::keeps_homotopy`]).
 // 3. From 1 on until none can be.
@@ -275,7 +255,7 @@ fn short_edges(complex: &CollapseComplex, at: &[u32], merge: f64) -> Vec<[u32; 2
 #[derive(Default)]
 pub(super) struct DistinctBalls {
     pub(super) balls: Vec<Sphere>,
-    /// For each ball all samples that it passes through; none where there are no samples.
+    /// For each ball all samples that it passes through.
     samples: Vec<Vec<u32>>,
     /// For each ball the volume of its tetrahedra.
     pub(super) volumes: Vec<f64>,
@@ -325,12 +305,6 @@ impl DistinctBalls {
             shape.inner_balls()?;
         }
         Ok(found)
-    }
-
-    /// Balls of which no samples are known.
-    pub(super) fn given(balls: &[Sphere]) -> Self {
-        let (samples, volumes) = (vec![Vec::new(); balls.len()], vec![0.0; balls.len()]);
-        Self { balls: balls.to_vec(), samples, volumes }
     }
 
     /// For each corner of the union of the balls, moved and grown to `moved`, its sample.

@@ -16,9 +16,8 @@
 //!    after the first that removes less than a quarter (`drop`) of what the one before it did*: the
 //!    paper's "dramatic drop", for which it has no number (file `schedule.rs`).
 //! 5. Section 4.3: rounds by volume with a test of topology, parts in ascending order. Only parts of
-//!    level 1 go.
-//! 6. Parts named by hand go in the end (`remove`), as the left ear of figure 12 does. They are
-//!    listed with ids, the largest first, in [`medial::simplifier::Extras`], as [`PartInfo`].
+//!    level 1 go. The parts left are listed with ids, the largest first, in
+//!    [`medial::simplifier::Extras`], as [`PartInfo`]. Parts named by hand, as in figure 12, are left out.
 //!
 //! # The level
 //! `t_v` in per cent, for all rounds by volume. A number of spheres ends the published schedule as close
@@ -28,33 +27,25 @@
 //! step. The diagnostics name the count on the other side of the number.
 //!
 //! # Results that do not reproduce
-//! - On an exact axis of a box there are twelve parts of level 1 and one of level 2, as in figure 5, and
-//!   so there are on a box that is sampled on a grid (the built-in one): 161 parts at first, these 13
-//!   after one round by triangle count. On the same box with 3,000 samples of blue noise there are not:
-//!   neighbouring polar balls often share no sample, so that their union has dimples, and its exact axis
-//!   has 12,800 parts. The rounds by triangle count leave 68, but where one of the small parts ended at
-//!   a seam, that has an edge of two triangles, and sheets grow together over it, by the rule of section
-//!   4.1.
-//! - Rounds without a test of topology are not harmless: on the built-in double torus they cut both
-//!   loops, on the bear with 35,000 samples of blue noise they leave 18 components. `topology=all` tests
-//!   there too.
+//! - On an exact axis of a box, and on one that is sampled on a grid, there are twelve parts of level 1 and
+//!   one of level 2, as in figure 5. With samples of blue noise there are not: neighbouring polar balls often
+//!   share no sample, so that their union has dimples. Where one of the small parts ended at a seam, that
+//!   has an edge of two triangles, and sheets grow together over it, by the rule of section 4.1.
+//! - Rounds without a test of topology are not harmless: they can cut loops and split components.
 //! - Pruning ends where all that is left is one sheet for each body, or sheets that hold loops, often
 //!   far above the requested number of spheres. The paper reports the same of the bunny's feet.
-//!
 //! - *The seed.* Moved balls make no loops: the axis of a solid has the same Betti numbers for every seed.
 //!   They do decide which small parts there are, hence which sheets grow together when these go, and which
-//!   single sheet is left in the end. Moved by `1e-4 r`, a twentieth of their growth, the balls of the
-//!   screwdriver end at 126 to 4,594 spheres, by the seed (0 to 9); moved by `1e-7 r` at 4,427 to 4,707. So
-//!   this is the default; a tenth of it tears the axis of a sampled frame, whose balls are in special position.
-//!   Other samples of the same surface still end elsewhere: that is the rule of section 4.1.
+//!   single sheet is left in the end. Moved by `1e-4 r` results differ widely by the seed, moved by `1e-7 r`
+//!   little; a tenth of that tears the axis of balls in special position. Other samples of the same surface
+//!   still end elsewhere: that is the rule of section 4.1.
 //!
 //! # Deviations from the paper
 //! - *The test of topology.* The paper keeps a part that lies on a cycle of its graph of parts and
 //!   contact curves, or whose removal disconnects its neighbours. That graph sees neither a hole in
 //!   a part nor a part that is bound to one connected contact curve at two ends, and a removal as it permits
 //!   can lose a loop. Here the part's Euler number decides, which is exact and needs no graph (proof in
-//!   `parts.rs`); what passes it passes the graph too. The graph is built and counted in the diagnostics
-//!   (`graph_loops`; `refused_leaves`: parts that only the exact test kept).
+//!   `parts.rs`).
 //! - Edges without triangles stay: on tubes they carry the loops. A part that is a whole component
 //!   stays, also in the rounds without a test.
 //! - Inner poles that are equally far from their sample, up to rounding, are all taken. On a grid which of
@@ -64,16 +55,13 @@
 //!   The results are 0.2 % larger. The paper merges equal corners before it makes the Voronoi diagram of
 //!   them; here those that stem from one sample are a little apart, and what the merging would not have
 //!   made is removed afterwards, as far as that keeps the topology: the facets between two of them
-//!   (`parts.rs`), and the vertices nearer than `merge` radii. Merged before, they contradict the dual complex
+//!   (`parts.rs`), and the vertices nearer than 1e-3 radii. Merged before, they contradict the dual complex
 //!   of the balls, and facets stay open.
 //! - The axis of the union is exact, not the subset of the Voronoi diagram of the corners that
 //!   intersects the power shape.
 //! - The inside test of the surface separates inner and outer poles.
-//! - A given medial mesh is pruned in place of step 1 (`axis=initial` does so with the Voronoi medial
-//!   mesh too). Where it was given, there are no poles on it: each interior tetrahedron counts for the face
-//!   nearest to its circumcentre. The Voronoi medial mesh holds all circumcentres, and each sphere
-//!   counts with its tetrahedron; its sheets are smaller and more, since Voronoi vertices near the surface
-//!   do not converge to the axis.
+//! - A given medial mesh is pruned in place of step 1. There are no poles on it: each interior tetrahedron
+//!   counts for the face nearest to its circumcentre.
 //! - A part that equals a threshold is removed.
 //! - The power crust of the remaining poles (section 5) is not made.
 
@@ -85,11 +73,11 @@ mod tests;
 
 use axis::Axis;
 use medial::Vec3;
-use medial::complex::{MedialMesh, betti};
+use medial::complex::MedialMesh;
 use medial::shape::Shape;
 use medial::simplifier::{
     Capability, Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, ParamFields,
-    RunContext, Simplification, Simplified, SimplifyError,
+    RunContext, Simplification, Simplified,
 };
 use parts::{Parts, Remaining};
 use schedule::Pruning;
@@ -116,8 +104,6 @@ pub struct PartInfo {
     pub centre: [f64; 3],
     /// Whether removing it leaves components and loops of the whole as they are.
     pub removable: bool,
-    /// Whether it was removed on demand, and is not in the medial mesh any more.
-    pub removed: bool,
 }
 
 /// Pruning by parts as a method.
@@ -145,7 +131,7 @@ pub fn method() -> Method<TamHeidrichParams> {
 fn prepare<'s>(shape: &'s Shape, params: TamHeidrichParams, run: &RunContext) -> Prepared<'s> {
     let params = params.validate()?;
     let mut diagnostics = Diagnostics::default();
-    let axis = Axis::of_shape(shape, &params, run, &mut diagnostics)?;
+    let axis = Axis::of_shape(shape, run, &mut diagnostics)?;
     Ok(Box::new(PreparedTamHeidrich { axis, params, diagnostics, run: run.clone() }))
 }
 
@@ -171,10 +157,8 @@ impl Simplification for PreparedTamHeidrich {
             Level::Native(t) => Some(t),
             _ => pruning.t_v,
         };
-        let Pruning { mut remaining, mut parts, mut diagnostics, .. } = pruning;
-        let mut listed = describe(&parts, &remaining);
-        self.remove_by_hand(&mut remaining, &mut parts, &mut listed, &mut diagnostics)?;
-        let extras = Extras::with(listed);
+        let Pruning { remaining, parts, diagnostics, .. } = pruning;
+        let extras = Extras::with(describe(&parts, &remaining));
         Ok(Simplified { mesh: remaining.mesh(), asked: level, native_level, diagnostics, extras })
     }
 }
@@ -191,45 +175,6 @@ impl PreparedTamHeidrich {
             }
             Level::Spheres(count) => Ok((published.clone(), count)),
         }
-    }
-
-    /// Step 6: removes parts without a test of topology, and reports the effect.
-    fn remove_by_hand(
-        &self,
-        remaining: &mut Remaining<'_>,
-        parts: &mut Parts,
-        listed: &mut [PartInfo],
-        diagnostics: &mut Diagnostics,
-    ) -> Result<()> {
-        let ids = &self.params.remove.0;
-        if ids.is_empty() {
-            return Ok(());
-        }
-        let before = betti(&remaining.mesh());
-        let order = by_size(parts);
-        for &id in ids {
-            let Some(part) = listed.get_mut(id as usize) else {
-                return Err(SimplifyError::Parameter(format!(
-                    "remove: there is no part {id}: at this level the axis has the parts 0 to {}",
-                    order.len().saturating_sub(1)
-                )));
-            };
-            // An id that is listed twice is removed once.
-            if !std::mem::replace(&mut part.removed, true) {
-                parts.remove(order[id as usize], remaining);
-            }
-        }
-        let after = betti(&remaining.mesh());
-        diagnostics.count("removed_by_hand", listed.iter().filter(|p| p.removed).count());
-        for (name, number) in ["b0", "b1", "b2"].into_iter().zip(after) {
-            diagnostics.count(&format!("by_hand_{name}"), number as usize);
-        }
-        if before != after {
-            diagnostics.warn(format!(
-                "removing parts by hand changed the Betti numbers from {before:?} to {after:?}"
-            ));
-        }
-        Ok(())
     }
 }
 
@@ -271,7 +216,6 @@ fn describe(parts: &Parts, remaining: &Remaining<'_>) -> Vec<PartInfo> {
         volume: parts.volume[part],
         centre: centroid(&remaining.axis.mesh, parts.faces(part)).to_array(),
         removable: parts.free[part] && parts.is_removable(part),
-        removed: false,
     });
     described.collect()
 }
@@ -308,82 +252,33 @@ medial::parameters! {
     /// Parameters of part pruning; the default is the paper's usual schedule.
     #[derive(Clone, Debug, PartialEq)]
     pub struct TamHeidrichParams {
-        /// The first rounds remove parts of at most this many triangles, without a test of the
-        /// topology.
-        t_t: usize = 5, "triangles";
         /// Largest number of rounds by triangle count; 0 for none.
         t_t_rounds: usize = 3, "rounds";
         /// These rounds end after one that removed less than this share of the previous one; 0 for the
         /// full number.
         drop: f64 = 0.25, "share";
         /// The later rounds remove parts of at most this volume, as far as the topology allows.
-        t_v: List<f64> = List(vec![1.0, 1.0]), "per cent of the solid's volume, one for each round";
-        /// The rounds that keep loops and components: those by volume, as published, all, or none.
-        topology: Checked = Checked::Volume, "volume, all or none";
-        /// The axis: that of the union of polar balls, or the initial medial mesh. `auto` takes the
-        /// latter where it was given.
-        axis: AxisChoice = AxisChoice::Auto, "auto, union or initial";
-        /// Parts to remove in the end, unchecked; ids are those of the list of parts of the same run
-        /// without this.
-        remove: List<u32> = List::default(), "ids of parts, separated by commas";
-        /// Factor of the radii of polar balls, so that balls that touch in a sample overlap.
-        radius_factor: f64 = 1.002, "pure number";
-        /// Largest seeded displacement of a polar ball along each axis.
-        jitter: f64 = 1e-7, "fraction of the radius";
-        /// Vertices of the axis nearer than this are merged, as far as the topology allows.
-        merge: f64 = 1e-3, "fraction of the radius";
+        t_v: List = List(vec![1.0, 1.0]), "per cent of the solid's volume, one for each round";
     }
-}
-
-/// The rounds that keep loops and components.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Checked {
-    /// Those by volume, as published.
-    Volume,
-    /// All.
-    All,
-    /// None.
-    None,
-}
-
-/// The axis to work on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum AxisChoice {
-    /// The given medial mesh where the shape has one, else that of the polar balls.
-    Auto,
-    /// The medial axis of the union of the polar balls, or of the spheres of the given mesh.
-    Union,
-    /// The initial medial mesh, given or Voronoi.
-    Initial,
 }
 
 /// Numbers, written as one number, as `1,5`, or as a JSON array.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Written<T>", into = "Vec<T>")]
-#[serde(bound(
-    serialize = "T: Clone + Serialize",
-    deserialize = "T: Deserialize<'de> + std::str::FromStr, T::Err: std::fmt::Display"
-))]
-pub struct List<T>(pub Vec<T>);
+#[serde(try_from = "Written", into = "Vec<f64>")]
+pub struct List(pub Vec<f64>);
 
 #[derive(Deserialize)]
 #[serde(untagged, expecting = "expected a number, numbers separated by commas, or an array")]
-enum Written<T> {
-    One(T),
-    Many(Vec<T>),
+enum Written {
+    One(f64),
+    Many(Vec<f64>),
     Text(String),
 }
 
-impl<T> TryFrom<Written<T>> for List<T>
-where
-    T: std::str::FromStr,
-    T::Err: std::fmt::Display,
-{
+impl TryFrom<Written> for List {
     type Error = String;
 
-    fn try_from(written: Written<T>) -> Result<Self, String> {
+    fn try_from(written: Written) -> Result<Self, String> {
         Ok(Self(match written {
             Written::One(number) => vec![number],
             Written::Many(numbers) => numbers,
@@ -396,8 +291,8 @@ where
     }
 }
 
-impl<T> From<List<T>> for Vec<T> {
-    fn from(list: List<T>) -> Self {
+impl From<List> for Vec<f64> {
+    fn from(list: List) -> Self {
         list.0
     }
 }
@@ -405,9 +300,6 @@ impl<T> From<List<T>> for Vec<T> {
 impl TamHeidrichParams {
     fn validate(self) -> Result<Self> {
         within("drop", self.drop, 0.0..=1.0)?;
-        within("radius_factor", self.radius_factor, 0.5..=2.0)?;
-        within("jitter", self.jitter, 0.0..=0.1)?;
-        within("merge", self.merge, 0.0..=0.1)?;
         self.t_v.0.iter().try_for_each(|&t| within("t_v", t, 0.0..=100.0))?;
         Ok(self)
     }

@@ -107,17 +107,17 @@ pub(super) struct Parts {
     /// Number of the vertices in its contact set.
     contacts: Vec<u32>,
     /// For each edge the number of parts that have it, and the exclusive or of their ids.
-    pub(super) at_edge: Vec<Shared>,
+    at_edge: Vec<Shared>,
     /// The same for each sphere; a curve counts as one more.
-    pub(super) at_sphere: Vec<Shared>,
+    at_sphere: Vec<Shared>,
     edge_seen: Vec<u32>,
     sphere_seen: Vec<u32>,
 }
 
 /// How many parts have a simplex.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Shared {
-    pub(super) count: u32,
+struct Shared {
+    count: u32,
     /// Exclusive or of the parts' ids: with one left, that one.
     xor: u32,
 }
@@ -447,88 +447,7 @@ impl<'a> Shrinking<'a> {
 }
 
 // ----------------------------------------------------------------------------
-// The topology graph of section 4.3, and the levels of section 4.1.
-//
-// 1. *Contact curves* are the edges and vertices that two pieces or more have, pieces being the parts and
-//    the curves, that is, connected edges without triangles. Connected ones are one *node*.
-// 2. The graph is bipartite, of pieces and nodes, so that a part may touch any number of nodes.
-// 3. The paper's test: a part may go if it is a leaf, that is, if it touches one node. With two or
-//    more it lies on a cycle or holds the rest together, with none it is a component.
-//
-// A part that can go by `parts.rs` is a leaf: where `H_1` and `H_0` of the closure and its contact
-// set vanish, the contact set is connected. The converse is false. A leaf that touches its node along
-// two curves, which are connected elsewhere, or that has a hole, can hold a loop. The graph does not
-// decide here; it counts these cases.
-
-/// Nodes and pieces of one decomposition.
-pub(super) struct Graph {
-    /// Number of nodes.
-    pub(super) nodes: usize,
-    /// Number of independent cycles.
-    pub(super) loops: usize,
-    /// For each part whether it touches exactly one node.
-    pub(super) is_leaf: Vec<bool>,
-}
-
-impl Graph {
-    /// The graph of parts, none of which was removed since. Cost `O(n log n)`.
-    pub(super) fn of(parts: &Parts, remaining: &Remaining<'_>) -> Self {
-        let axis = remaining.axis;
-        let whole = &axis.mesh;
-        let mut nodes = DisjointSets::singletons(whole.spheres.len());
-        let mut curves = DisjointSets::singletons(whole.spheres.len());
-        for (edge, &[a, b]) in whole.edges.iter().enumerate() {
-            if parts.at_edge[edge].count > 1 {
-                nodes.join(a, b);
-            }
-            if axis.incidence.faces_at()[edge] == 0 {
-                curves.join(a, b);
-            }
-        }
-        // Pieces: the parts, then the curves by their smallest sphere.
-        let mut pairs: Vec<u64> = Vec::new();
-        let mut touch = |piece: usize, v: u32| {
-            if parts.at_sphere[v as usize].count > 1 {
-                pairs.push((piece as u64) << 32 | u64::from(nodes.find(v)));
-            }
-        };
-        for part in 0..parts.len() {
-            let corners = parts.faces(part).iter().flat_map(|&f| whole.faces[f as usize]);
-            corners.for_each(|v| touch(part, v));
-        }
-        for v in (0..axis.on_curve.len() as u32).filter(|&v| axis.on_curve[v as usize]) {
-            touch(parts.len() + curves.find(v) as usize, v);
-        }
-        pairs.sort_unstable();
-        pairs.dedup();
-        let mut is_leaf = vec![false; parts.len()];
-        for of_piece in pairs.chunk_by(|a, b| a >> 32 == b >> 32) {
-            if let Some(leaf) = is_leaf.get_mut((of_piece[0] >> 32) as usize) {
-                *leaf = of_piece.len() == 1;
-            }
-        }
-        let (nodes, loops) = cycle_rank(&pairs);
-        Self { nodes, loops, is_leaf }
-    }
-}
-
-/// The nodes of a bipartite graph and its independent cycles, from its edges in order.
-fn cycle_rank(pairs: &[u64]) -> (usize, usize) {
-    let pieces = pairs.chunk_by(|a, b| a >> 32 == b >> 32);
-    let mut nodes: Vec<u32> = pairs.iter().map(|&pair| pair as u32).collect();
-    nodes.sort_unstable();
-    nodes.dedup();
-    let mut sets = DisjointSets::singletons(pieces.clone().count() + nodes.len());
-    let first_node = pieces.clone().count();
-    let mut loops = 0;
-    for (piece, of_piece) in pieces.enumerate() {
-        for &pair in of_piece {
-            let node = nodes.partition_point(|&n| n < pair as u32);
-            loops += usize::from(!sets.join(piece as u32, (first_node + node) as u32));
-        }
-    }
-    (nodes.len(), loops)
-}
+// The levels of section 4.1.
 
 /// For each part its level: 1 at a free edge, one more than that of the lowest part next to it over
 /// an edge; 0 where no part of level 1 can be reached.

@@ -7,10 +7,13 @@
 
 use medial::simplifier::{Diagnostics, RunContext};
 
+use super::TamHeidrichParams;
 use super::axis::Axis;
-use super::parts::{Graph, Parts, Remaining};
-use super::{Checked, TamHeidrichParams};
+use super::parts::{Parts, Remaining};
 use crate::Result;
+
+/// `t_t`: largest number of triangles of a part that the rounds by triangle count remove.
+const SMALL_PART: usize = 5;
 
 /// The threshold of a round.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,7 +88,7 @@ impl<'a> Pruning<'a> {
         let whole = self.remaining.betti();
         let mut before = 0;
         for k in 0..params.t_t_rounds {
-            let removed = self.round(Measure::Triangles(params.t_t))?;
+            let removed = self.round(Measure::Triangles(SMALL_PART))?;
             // Nothing removed: the next round would find the same parts.
             if removed == 0 || k > 0 && (removed as f64) < params.drop * before as f64 {
                 break;
@@ -99,7 +102,7 @@ impl<'a> Pruning<'a> {
         if left != whole {
             self.diagnostics.warn(format!(
                 "rounds that do not check topology, as published, changed the Betti numbers from \
-                 {whole:?} to {left:?}; topology=all keeps them"
+                 {whole:?} to {left:?}"
             ));
         }
         Ok(())
@@ -124,13 +127,8 @@ impl<'a> Pruning<'a> {
         }
         self.run.step(self.rounds, self.rounds + 1)?;
         let candidates = self.candidates(measure);
-        let checked = match self.params.topology {
-            Checked::Volume => matches!(measure, Measure::Volume(_)),
-            Checked::All => true,
-            Checked::None => false,
-        };
-        let graph = checked.then(|| Graph::of(&self.parts, &self.remaining));
-        let (mut removed, mut refused, mut leaves) = (0, 0, 0);
+        let checked = matches!(measure, Measure::Volume(_));
+        let (mut removed, mut refused) = (0, 0);
         for (done, &part) in candidates.iter().enumerate() {
             if self.is_enough() {
                 break;
@@ -147,7 +145,6 @@ impl<'a> Pruning<'a> {
                 removed += usize::from(self.remove(part));
             } else {
                 refused += 1;
-                leaves += usize::from(graph.as_ref().is_some_and(|g| g.is_leaf[part]));
             }
         }
         self.rounds += 1;
@@ -156,11 +153,8 @@ impl<'a> Pruning<'a> {
             Measure::Triangles(_) => None,
         };
         let name = format!("round_{}", self.rounds);
-        let mut counts = vec![("removed", removed), ("refused", refused)];
-        if let Some(graph) = graph {
-            let of_graph = [("nodes", graph.nodes), ("graph_loops", graph.loops)];
-            counts.extend(of_graph.into_iter().chain([("refused_leaves", leaves)]));
-        }
+        let counts =
+            [("checked", usize::from(checked)), ("removed", removed), ("refused", refused)];
         // Parts that lost a neighbour may have merged, or have a free edge now.
         if removed > 0 {
             self.parts = Parts::of(&self.remaining);

@@ -8,20 +8,17 @@
 //! Samples see the new star and its rim alone. Samples that another primitive would serve better count too much,
 //! never too little.
 
-use std::collections::BTreeSet;
-
 use medial::Vec3;
-use medial::complex::collapse::{CollapseComplex, folds_over};
-use medial::complex::{Crossings, Incidence, MedialMesh, MedialUnion, Primitive, Sphere};
+use medial::complex::collapse::CollapseComplex;
+use medial::complex::{Incidence, MedialMesh, Primitive, Sphere};
 use medial::geometry::{Cone, SlabFace};
 use medial::simplifier::RunContext;
 use rayon::prelude::*;
 
-use super::goal::{Edited, Goal, Kept, Points, Residuals, uncovered, union_of, vertices};
-use super::rounds::{
-    Block, Descent, LEAST_RADIUS, Objective, Rest, add_product, backward, cholesky, forward,
-};
-use super::start::{Sheets, corners};
+use super::block_cholesky::{Block, add_product, backward, cholesky, forward};
+use super::descent::{Descent, LEAST_RADIUS};
+use super::goal::{DEEP, Goal, uncovered, vertices};
+use super::guard::Sheets;
 use crate::Result;
 
 /// Exponent of the price.
@@ -30,19 +27,20 @@ const POWER: i32 = 8;
 /// Weight of a point of a primitive that protrudes. Each represents several samples.
 const PROTRUDING: f64 = 50.0;
 
-/// The protrusion of one ball counts from this share on.
+/// Share of the price below which the protrusion of a ball is ignored.
 const NEGLIGIBLE: f64 = 1e-4;
 
-/// Share of the trace that pulls a minimiser towards the midpoint of its edge.
+/// Pull of a minimiser towards the midpoint of its edge, as a share of the trace.
 const PULL: f64 = 1e-3;
 
-/// One of this number of samples is looked at first.
+/// Samples for each one that the first price of an edge looks at.
 const ROUGH: usize = 8;
 
-/// Edges that are priced before the limit is updated, at least.
+/// Smallest number of edges that are priced before the limit is updated.
 const BLOCK: usize = 16;
 
-/// Distance between points of a new star at which it is tested for protruding.
+/// Distance between points of a new star at which it is tested for protruding, a fraction of the
+/// diagonal.
 const SPACING: f64 = 0.02;
 
 /// An edge with the place of its merged sphere.
@@ -82,13 +80,30 @@ pub(super) struct Passed {
 ///
 /// A `careful` pass looks at little more than the edges that it needs, and leaves the rest to the next one,
 /// which prices them again. Where each collapse would fold a face or make faces cross the cheapest of these are made.
-pub(super) fn pass(descent: &Descent<'_>, target: usize, careful: bool) -> Option<Passed> {
-    let strict =
-        if descent.guard.is_tangled() { None } else { passed(descent, target, careful, true) };
-    strict.or_else(|| passed(descent, target, careful, false))
+///
+/// # Errors
+/// When the run is cancelled.
+pub(super) fn pass(
+    descent: &Descent<'_>,
+    target: usize,
+    careful: bool,
+    run: &RunContext,
+) -> Result<Option<Passed>> {
+    if !descent.guard.is_tangled()
+        && let Some(strict) = passed(descent, target, careful, true, run)?
+    {
+        return Ok(Some(strict));
+    }
+    passed(descent, target, careful, false, run)
 }
 
-fn passed(descent: &Descent<'_>, target: usize, careful: bool, strict: bool) -> Option<Passed> {
+fn passed(
+    descent: &Descent<'_>,
+    target: usize,
+    careful: bool,
+    strict: bool,
+    run: &RunContext,
+) -> Result<Option<Passed>> {
     let mesh = &descent.mesh;
     let mut complex = CollapseComplex::from_mesh(mesh);
     let stars = Stars::new(descent);
@@ -96,8 +111,9 @@ fn passed(descent: &Descent<'_>, target: usize, careful: bool, strict: bool) -> 
     let wanted = if careful { needed * 3 / 2 + 1 } else { mesh.edges.len() };
     let mut merged = vec![false; mesh.spheres.len()];
     let mut sheets = Sheets::new(mesh, strict);
-    let priced = stars.cheapest(&complex, &sheets, descent.goal, wanted);
-    let dearest = priced.last()?.price.max(0.0);
+    let priced = stars.cheapest(&complex, &sheets, descent.goal, wanted, run)?;
+    let Some(last) = priced.last() else { return Ok(None) };
+    let dearest = last.price.max(0.0);
     for Priced { ends: [a, b], sphere, .. } in priced {
         if complex.sphere_count() <= target {
             break;
@@ -127,7 +143,8 @@ fn passed(descent: &Descent<'_>, target: usize, careful: bool, strict: bool) -> 
     // The mesh numbers the spheres that are left in their order.
     let of = complex.vertices().map(|v| (!merged[v as usize]).then_some(v));
     let of: Vec<Option<u32>> = of.collect();
-    (complex.sphere_count() < mesh.spheres.len()).then(|| Passed { mesh: complex.to_mesh(), of })
+    Ok((complex.sphere_count() < mesh.spheres.len())
+        .then(|| Passed { mesh: complex.to_mesh(), of }))
 }
 
 /// The samples that each simplex serves, and each sphere's share of the squares.
@@ -167,8 +184,7 @@ impl<'a> Stars<'a> {
             face.iter().for_each(|&v| this.faces[v as usize].push(f));
         }
         let surface = points.samples.iter().map(|s| (s.point, s.weight, -1.0));
-        let interior =
-            points.interior.iter().map(|x| (x.point, x.weight, x.depth.min(points.deep)));
+        let interior = points.interior.iter().map(|x| (x.point, x.weight, x.depth.min(DEEP)));
         for ((point, weight, depth), found) in surface.chain(interior).zip(&residuals.nearest) {
             let mut served = Served { point, weight, depth, now: 0.0 };
             served.now = served.error(found.signed).powi(POWER);
@@ -212,7 +228,8 @@ impl<'a> Stars<'a> {
         sheets: &Sheets<'_>,
         goal: &Goal,
         wanted: usize,
-    ) -> Vec<Priced> {
+        run: &RunContext,
+    ) -> Result<Vec<Priced>> {
         let edges = 0..self.mesh.edges.len();
         let mut order: Vec<(f64, usize)> =
             edges.into_par_iter().map(|e| (self.rough_price(complex, e), e)).collect();
@@ -223,14 +240,17 @@ impl<'a> Stars<'a> {
             // A complex for each piece of work, because the homotopy test marks vertices.
             let priced = block.par_iter().map_init(
                 || complex.clone(),
-                |complex, &(_, e)| self.price(complex, sheets, goal, e, limit),
+                |complex, &(_, e)| {
+                    run.check()?;
+                    Ok(self.price(complex, sheets, goal, e, limit))
+                },
             );
-            let priced: Vec<Option<Priced>> = priced.collect();
+            let priced = priced.collect::<Result<Vec<Option<Priced>>>>()?;
             found.extend(priced.into_iter().flatten());
             found.sort_by(|x, y| x.price.total_cmp(&y.price).then(x.ends.cmp(&y.ends)));
             found.truncate(wanted);
         }
-        found
+        Ok(found)
     }
 
     /// The price with the merged sphere at the midpoint, by a few samples.
@@ -432,7 +452,7 @@ impl Ring {
         let (mut sum, mut known) = (0.0, None);
         for ball in balls {
             let enough = ball.radius - small;
-            let Some(depth) = goal.depth_of_moved(ball.centre, enough, 0.0, &mut known) else {
+            let Some(depth) = goal.depth_of_moved(ball.centre, enough, &mut known) else {
                 continue;
             };
             sum += PROTRUDING * (ball.radius - depth.value).max(0.0).powi(POWER);
@@ -442,313 +462,4 @@ impl Ring {
         }
         sum
     }
-}
-
-// ----------------------------------------------------------------------------
-// The limits of a step: where a centre would leave the solid it stays at the surface, and where a face would fold
-// over or come to cross another one the step is shortened.
-
-/// Times that the step of a sphere is halved before it is taken back altogether.
-const HALVINGS: usize = 4;
-
-/// A mesh with more than one pair of crossing faces for this number of faces is a tangle.
-const TANGLED: usize = 2;
-
-/// Faces that stay where they are, next to a mesh that moves. Vertices that are not of the mesh have larger
-/// numbers than those that are.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Still {
-    pub faces: Vec<[u32; 3]>,
-    pub corners: Vec<[Vec3; 3]>,
-    /// Whether the mesh around is a tangle.
-    pub is_tangled: bool,
-}
-
-/// Violations that a mesh must avoid while its spheres move.
-pub(super) struct Guard {
-    still: Crossings,
-    /// Pairs that cross already.
-    known: BTreeSet<Pair>,
-    is_tangled: bool,
-}
-
-/// A face of a mesh, and one that it crosses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Pair {
-    Moving([u32; 2]),
-    Still([u32; 2]),
-}
-
-impl Guard {
-    pub fn new(mesh: &MedialMesh, still: Still) -> Self {
-        let Still { faces, corners, is_tangled } = still;
-        let tree = Crossings::new(faces.len(), |f| corners[f as usize]);
-        let mut this = Self { still: tree, known: BTreeSet::new(), is_tangled };
-        this.known = this.crossing(mesh, |_| true).into_iter().collect();
-        let is_whole = faces.is_empty();
-        this.is_tangled |= is_whole && TANGLED * this.known.len() > mesh.faces.len();
-        this
-    }
-
-    /// Whether more faces may come to cross, as many do: at the axis of a tube, the start is a tangle of tiny faces.
-    pub fn is_tangled(&self) -> bool {
-        self.is_tangled
-    }
-
-    /// How many pairs of faces crossed at first.
-    pub fn crossings(&self) -> usize {
-        self.known.len()
-    }
-
-    /// Brings a step within its limits: centres outside are clamped, and the corners of faces that would fold
-    /// over, or come to cross another one, go half the way, a quarter, or stay where they were. Returns these corners,
-    /// in ascending order.
-    pub fn hold(&self, before: &MedialMesh, after: &mut MedialMesh, goal: &Goal) -> Vec<u32> {
-        clamp(after, goal);
-        if self.is_tangled {
-            return vec![];
-        }
-        // Taking one vertex back can fold another face of it. This ends: with all taken back the mesh is as before.
-        let mut halvings = vec![0; before.spheres.len()];
-        // The faces that are looked at: all, and then those of vertices taken back.
-        let mut changed = vec![true; before.spheres.len()];
-        loop {
-            let mut back = before.faces.clone();
-            back.retain(|&face| folds_over(corners(before, face), corners(after, face)));
-            let new = self.crossing(after, |face| face.iter().any(|&v| changed[v as usize]));
-            let new = new.into_iter().filter(|pair| !self.known.contains(pair));
-            for pair in new {
-                match pair {
-                    Pair::Moving(faces) => back.extend(faces.map(|f| before.faces[f as usize])),
-                    Pair::Still([face, _]) => back.push(before.faces[face as usize]),
-                }
-            }
-            let mut back: BTreeSet<u32> = back.into_iter().flatten().collect();
-            back.retain(|&v| {
-                // Radii play no part in either.
-                let [old, new] = [before, &*after].map(|mesh| mesh.spheres.get(v as usize));
-                old.map(|sphere| sphere.centre) != new.map(|sphere| sphere.centre)
-            });
-            if back.is_empty() {
-                break;
-            }
-            changed.fill(false);
-            for v in back {
-                changed[v as usize] = true;
-                let (old, new) = (before.spheres[v as usize], &mut after.spheres[v as usize]);
-                let halvings = &mut halvings[v as usize];
-                *halvings += 1;
-                let half = old.lerp(*new, 0.5);
-                let is_inside = *halvings < HALVINGS && goal.clamped(&[half.centre])[0].is_none();
-                *new = if is_inside { half } else { old };
-            }
-        }
-        (0..).zip(halvings).filter(|&(_, halvings)| halvings > 0).map(|(v, _)| v).collect()
-    }
-
-    /// The pairs with a face of the mesh for which `is_chosen`.
-    fn crossing(
-        &self,
-        mesh: &MedialMesh,
-        is_chosen: impl Fn(&[u32; 3]) -> bool + Sync,
-    ) -> Vec<Pair> {
-        let moving =
-            Crossings::new(mesh.faces.len(), |face| corners(mesh, mesh.faces[face as usize]));
-        let moving = moving.pairs_with(|face| is_chosen(&mesh.faces[face as usize]));
-        let moving = moving.into_iter().map(Pair::Moving);
-        let chosen = (0..mesh.faces.len() as u32).filter(|&f| is_chosen(&mesh.faces[f as usize]));
-        let still = chosen.flat_map(|face| {
-            let own = mesh.faces[face as usize];
-            let others = self.still.of(corners(mesh, own));
-            others.into_iter().map(move |other| Pair::Still([face, other]))
-        });
-        moving.chain(still).collect()
-    }
-}
-
-/// Moves centres outside of the solid to the closest point of its surface.
-pub(super) fn clamp(mesh: &mut MedialMesh, goal: &Goal) {
-    let centres: Vec<Vec3> = mesh.spheres.iter().map(|sphere| sphere.centre).collect();
-    for (sphere, clamped) in mesh.spheres.iter_mut().zip(goal.clamped(&centres)) {
-        sphere.centre = clamped.unwrap_or(sphere.centre);
-    }
-}
-
-// ----------------------------------------------------------------------------
-// Steps of a few spheres: those around the places where the mesh was just edited.
-//
-// The spheres of the places and their neighbours move, with the simplices that have one of them as a
-// corner. All other simplices stay, so for each sample their distance is one number. A step costs what the
-// samples around the places cost.
-
-/// Samples that the rest of the mesh serves are looked at up to this distance from the moving part.
-const REACH: f64 = 0.02;
-
-/// Moves the spheres of an edited mesh around `places`, at one power after the other, with `steps` steps each. `of` has
-/// for each sphere its number in the mesh `before`; it is `None` at the places.
-///
-/// # Errors
-/// When the run is cancelled.
-pub(super) fn settle(
-    before: &Descent<'_>,
-    mesh: &mut MedialMesh,
-    of: &[Option<u32>],
-    stages: &[(i32, usize)],
-    run: &RunContext,
-) -> Result<()> {
-    let moving = around(mesh, of);
-    let part = Part::of(mesh, &moving);
-    let kept = Edited { before: &before.mesh, mesh, of }.kept(&moving);
-    let (points, limits) = nearby(before, &kept, &union_of(&part.mesh)?, rest_of(mesh, &moving))?;
-    let share = part.mesh.spheres.len() as f64 / mesh.spheres.len() as f64;
-    let is_tangled = before.guard.is_tangled();
-    let still = Still { is_tangled, ..part.still(mesh, &moving) };
-    let Part { mesh: own, fixed, .. } = part;
-    let around = Rest { fixed, limits, still };
-    let mut descent = Descent::of_part(before.goal, points, own, around, share)?;
-    for &(power, steps) in stages {
-        descent.run(Objective::power(power, descent.largest()), steps, run)?;
-    }
-    for (&v, &sphere) in part.spheres.iter().zip(&descent.mesh.spheres) {
-        mesh.spheres[v as usize] = sphere;
-    }
-    Ok(())
-}
-
-/// The samples that the moving part serves or may come to serve, and their distances to the rest. What served a sample
-/// `before` and was `kept` is the nearest primitive of the rest.
-fn nearby(
-    before: &Descent<'_>,
-    kept: &Kept,
-    part: &MedialUnion,
-    rest: Option<MedialMesh>,
-) -> Result<(Points, Vec<f64>)> {
-    let Descent { points: all, residuals: Residuals { nearest, .. }, .. } = before;
-    let (lo, hi) = part.bounding_box();
-    let is_near = |p: Vec3| (p - lo).min_element() > 0.0 && (hi - p).min_element() > 0.0;
-    let outside = all.outside.iter().copied().filter(|&p| is_near(p)).collect();
-    let mut points = Points { outside, deep: all.deep, ..Points::default() };
-    let places: Vec<Vec3> = all.places().collect();
-    let staying = nearest.iter().map(|found| kept.of(found.primitive).map(|_| found.signed));
-    let staying: Vec<Option<f64>> = staying.collect();
-    let within = staying.iter().map(|signed| signed.map_or(f64::NEG_INFINITY, |s| s + REACH));
-    let reached = part.below_batch(&places, &within.collect::<Vec<_>>());
-    let lost = places.iter().zip(&staying).filter(|(_, signed)| signed.is_none());
-    let lost: Vec<Vec3> = lost.map(|(&p, _)| p).collect();
-    let rest = rest.map(|rest| union_of(&rest)).transpose()?;
-    let of_rest = rest.map(|rest| rest.signed_batch(&lost)).unwrap_or_default();
-    let mut of_rest = of_rest.into_iter();
-    let mut limits = vec![];
-    for (i, signed) in staying.into_iter().enumerate() {
-        if signed.is_some() && reached[i].is_none() {
-            continue;
-        }
-        match all.samples.get(i) {
-            Some(&sample) => points.samples.push(sample),
-            None => points.interior.push(all.interior[i - all.samples.len()]),
-        }
-        limits.push(signed.or_else(|| of_rest.next()).unwrap_or(f64::INFINITY));
-    }
-    Ok((points, limits))
-}
-
-/// Which spheres are new or next to a new one. With their neighbours, too, the results were no better.
-fn around(mesh: &MedialMesh, of: &[Option<u32>]) -> Vec<bool> {
-    let own: Vec<bool> = of.iter().map(Option::is_none).collect();
-    let mut reached = own.clone();
-    for &[a, b] in &mesh.edges {
-        reached[a as usize] |= own[b as usize];
-        reached[b as usize] |= own[a as usize];
-    }
-    reached
-}
-
-/// The simplices with a moving corner, as a mesh of their own.
-pub(super) struct Part {
-    pub mesh: MedialMesh,
-    /// The places of its spheres in the whole mesh.
-    spheres: Vec<u32>,
-    /// Which of its spheres stay.
-    fixed: Vec<bool>,
-}
-
-impl Part {
-    pub fn of(mesh: &MedialMesh, moving: &[bool]) -> Self {
-        let is_moving = |v: &u32| moving[*v as usize];
-        let edges: Vec<_> = mesh.edges.iter().filter(|e| e.iter().any(is_moving)).collect();
-        let faces: Vec<_> = mesh.faces.iter().filter(|f| f.iter().any(is_moving)).collect();
-        let mut used = moving.to_vec();
-        edges.iter().for_each(|e| e.iter().for_each(|&v| used[v as usize] = true));
-        faces.iter().for_each(|f| f.iter().for_each(|&v| used[v as usize] = true));
-        // The side of a face opposite to its moving corner is part of the rest.
-        let sides = mesh.edges.iter().filter(|&&[a, b]| {
-            !is_moving(&a)
-                && !is_moving(&b)
-                && used[a as usize]
-                && used[b as usize]
-                && faces.iter().any(|f| f.contains(&a) && f.contains(&b))
-        });
-        let mut kept: Vec<[u32; 2]> = edges.into_iter().chain(sides).copied().collect();
-        kept.sort_unstable();
-        let spheres: Vec<u32> = (0..used.len() as u32).filter(|&v| used[v as usize]).collect();
-        let mut place = vec![0; used.len()];
-        for (new, &v) in (0..).zip(&spheres) {
-            place[v as usize] = new;
-        }
-        let edges = kept.into_iter().map(|e| e.map(|v| place[v as usize])).collect();
-        let faces = faces.into_iter().map(|f| f.map(|v| place[v as usize])).collect();
-        let fixed = spheres.iter().map(|v| !is_moving(v)).collect();
-        let own: Vec<Sphere> = spheres.iter().map(|&v| mesh.spheres[v as usize]).collect();
-        let mesh = MedialMesh { spheres: own, edges, faces, contacts: None };
-        Self { mesh, spheres, fixed }
-    }
-
-    /// A primitive of the part, as one of the whole mesh.
-    pub fn in_whole(&self, whole: &MedialMesh, primitive: Primitive) -> Primitive {
-        let found = |place: Option<usize>| place.expect("the part is of the whole") as u32;
-        match primitive {
-            Primitive::Sphere(v) => Primitive::Sphere(self.spheres[v as usize]),
-            Primitive::Edge(e) => {
-                let edge = self.mesh.edges[e as usize].map(|v| self.spheres[v as usize]);
-                Primitive::Edge(found(whole.edges.binary_search(&edge).ok()))
-            }
-            Primitive::Face(f) => {
-                let face = self.mesh.faces[f as usize].map(|v| self.spheres[v as usize]);
-                Primitive::Face(found(whole.faces.binary_search(&face).ok()))
-            }
-        }
-    }
-
-    /// The faces of the whole mesh without a moving corner, with its spheres numbered as in the part, and
-    /// those that are not in it after them.
-    fn still(&self, whole: &MedialMesh, moving: &[bool]) -> Still {
-        let own = self.spheres.len() as u32;
-        let mut place: Vec<u32> = (0..whole.spheres.len() as u32).map(|v| own + v).collect();
-        for (new, &v) in (0..).zip(&self.spheres) {
-            place[v as usize] = new;
-        }
-        let still = whole.faces.iter().filter(|face| !face.iter().any(|&v| moving[v as usize]));
-        let (faces, corners) =
-            still.map(|face| (face.map(|v| place[v as usize]), corners(whole, *face))).unzip();
-        Still { faces, corners, is_tangled: false }
-    }
-}
-
-/// The simplices without a moving corner, if there are any.
-fn rest_of(mesh: &MedialMesh, moving: &[bool]) -> Option<MedialMesh> {
-    let stays = |v: &u32| !moving[*v as usize];
-    let spheres: Vec<u32> = (0..moving.len() as u32).filter(stays).collect();
-    let mut place = vec![0; moving.len()];
-    for (new, &v) in (0..).zip(&spheres) {
-        place[v as usize] = new;
-    }
-    let edges = mesh.edges.iter().filter(|e| e.iter().all(stays));
-    let faces = mesh.faces.iter().filter(|f| f.iter().all(stays));
-    let rest = MedialMesh {
-        spheres: spheres.iter().map(|&v| mesh.spheres[v as usize]).collect(),
-        edges: edges.map(|e| e.map(|v| place[v as usize])).collect(),
-        faces: faces.map(|f| f.map(|v| place[v as usize])).collect(),
-        contacts: None,
-    };
-    (!rest.spheres.is_empty()).then_some(rest)
 }

@@ -17,47 +17,53 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-use super::collapse::Part;
+use super::swap::Part;
 use crate::Result;
 
 /// Samples of the surface, below 500 spheres and from there on.
 const SAMPLES: [usize; 2] = [6_000, 12_000];
 
-/// Samples along sharp edges, a share of those. With a quarter, a face grew across a hole of `abc_bracket`.
+/// Samples along sharp edges, as a share of those. With a quarter, a face grew across a hole of
+/// `abc_bracket`.
 const SHARE_OF_EDGES: f64 = 0.1;
 
-/// Samples of the surface from which the largest errors are searched, and twice as many of the union. More gave
-/// the same errors at 100 spheres.
+/// Samples of the surface from which the largest errors are searched. The union has twice as many. More
+/// gave the same errors at 100 spheres.
 const SEARCHED: usize = 8_000;
 
-/// There are at most this many times fewer vertices among the samples.
+/// Samples for each vertex of the surface among them, at least.
 const SHARE_OF_VERTICES: usize = 4;
 
-/// Makes the random numbers differ from those of the start and of the judge with the same seed.
+/// Constant that separates the random numbers from those of the start and of the judge with the same
+/// seed.
 const STREAM: u64 = 0x7469_6768_7421_0a0b;
 
-/// Weight of a vertex of the surface and of a point inside; an area-uniform sample has 1.
+/// Weight of a vertex of the surface and of a point inside. An area-uniform sample has 1.
 pub(super) const ASIDE: f64 = 0.3;
 
-/// Cosine of the angle by which the surface turns at a sharp edge, and the least distance of samples along it.
+/// Cosine of the angle by which the surface turns at a sharp edge, at most.
 const SHARP: f64 = 0.866;
+/// Smallest distance of samples along sharp edges, a fraction of the diagonal.
 const CLOSEST: f64 = 1e-3;
 
 /// Interior points that are residuals from the start, below 500 spheres and from there on.
 const INTERIOR: [usize; 2] = [2_500, 4_000];
 
-/// Interior points among which uncovered ones are looked for.
+/// Interior points among which uncovered ones are searched.
 const POOL: usize = 20_000;
 
 /// Cells along the longest side of the grid in which interior points are laid out.
 const GRID: usize = 40;
 
-/// How far below the surface a clamped centre is, so that rounding does not leave it outside.
+/// Depth of a clamped centre below the surface, a fraction of the diagonal, so that rounding does not
+/// leave it outside.
 const WITHIN: f64 = 1e-9;
 
-/// Times that a ball is shrunk at most; the share of its radius that may be occupied; its least radius.
+/// Limit of the steps that shrink a ball.
 const SHRINKS: usize = 30;
+/// Share of the radius of a ball that may be occupied.
 const EMPTY: f64 = 1e-3;
+/// Smallest radius of a shrunk ball, a fraction of the diagonal.
 const SMALLEST_BALL: f64 = 1e-4;
 
 /// A point and how much it counts.
@@ -84,8 +90,6 @@ pub(super) struct Points {
     pub interior: Vec<Interior>,
     /// Places outside that a union reached: balls there are watched for protruding.
     pub outside: Vec<Vec3>,
-    /// Depth from which on an uncovered interior point counts alike.
-    pub deep: f64,
 }
 
 impl Points {
@@ -98,7 +102,7 @@ impl Points {
     /// The signed distance at which an interior point is held well enough, by its place among all.
     pub fn enough(&self, i: usize) -> Option<f64> {
         let i = i.checked_sub(self.samples.len())?;
-        Some(held_from(self.interior[i].depth.min(self.deep)))
+        Some(held_from(self.interior[i].depth.min(DEEP)))
     }
 }
 
@@ -165,7 +169,7 @@ impl Goal {
         // Along a curve: the primitive of a sample mostly serves the next one.
         let places: Vec<Vec3> = samples.iter().map(|sample| sample.point).collect();
         let samples = morton_order(&places).into_iter().map(|(_, i)| samples[i as usize]).collect();
-        Points { samples, interior, outside: Vec::new(), deep: DEEP }
+        Points { samples, interior, outside: Vec::new() }
     }
 
     /// A search for the largest errors of a medial mesh.
@@ -208,17 +212,10 @@ impl Goal {
     ///
     /// Depths are 1-Lipschitz, so a place that moved less than its depth is on the same side, and one
     /// that is still deeper than `enough` needs no query: `None`.
-    /// Where a query is needed it looks farther than `enough` by `margin` times the way, to spare the next one.
-    pub fn depth_of_moved(
-        &self,
-        p: Vec3,
-        enough: f64,
-        margin: f64,
-        known: &mut Option<Known>,
-    ) -> Option<Depth> {
-        let (mut side, mut moved) = (None, 0.0);
+    pub fn depth_of_moved(&self, p: Vec3, enough: f64, known: &mut Option<Known>) -> Option<Depth> {
+        let mut side = None;
         if let Some(known) = known {
-            moved = p.distance(known.point);
+            let moved = p.distance(known.point);
             if known.depth - moved >= enough {
                 return None;
             }
@@ -233,15 +230,14 @@ impl Goal {
         let side = side.unwrap_or_else(|| self.inside.side(p));
         let face = known.map(|known| known.face);
         // Inside only faces within `enough` matter.
-        let beyond = enough + margin * moved;
         let closest = match side {
-            Side::Inside if beyond > 0.0 => self.tree.closest_within_from(p, beyond, face),
+            Side::Inside if enough > 0.0 => self.tree.closest_within_from(p, enough, face),
             _ => Some(self.tree.closest_from(p, face)),
         };
         let exact = closest.map(|closest| self.signed(p, &closest, side));
         *known = Some(Known {
             point: p,
-            depth: exact.map_or(beyond, |exact| exact.value),
+            depth: exact.map_or(enough, |exact| exact.value),
             face: closest.map_or(face.unwrap_or(0), |closest| closest.face),
             exact,
         });
@@ -365,20 +361,20 @@ pub(super) fn refused(error: MetricError) -> SimplifyError {
 // `d sigma / d c_j = -a_j u`, `d sigma / d r_j = -a_j`. The weights `a` may be held, because `sigma` is a
 // minimum over them (the envelope theorem).
 
-/// Depth from which on an uncovered interior point counts alike, before the rounds.
+/// Depth from which on uncovered interior points count alike, a fraction of the
+/// diagonal.
 pub(super) const DEEP: f64 = 0.02;
 
 /// Weight of a point of the medial mesh whose ball may protrude.
 const PROTRUDING: f64 = 0.3;
 
-/// Points of the medial mesh at which balls are watched for protruding. Twice as many gave the same errors.
+/// Points of the medial mesh at which balls are watched for protruding. Twice as many gave the same
+/// errors.
 const HELD: usize = 1_500;
 
-/// How much farther than needed the depth of a ball is looked for, in ways that it moved last.
-const FARTHER: f64 = 0.5;
-
-/// Golden ratio's fractional part, and the two of the plastic number: steps of the sequences.
+/// Fractional part of the golden ratio: offset of the sequence of points on a face.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
+/// Steps of that sequence, by the plastic number.
 const PLASTIC: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 
 /// A residual `error`, whose derivative by the `j`-th sphere of its simplex is
@@ -664,7 +660,7 @@ pub(super) fn residuals(
             Some(&Sample { point, weight }) => (point, weight, signed, 1.0),
             None => {
                 let Interior { point, depth, weight } = points.interior[i - count];
-                (point, weight, uncovered(depth.min(points.deep), signed), slope(signed))
+                (point, weight, uncovered(depth.min(DEEP), signed), slope(signed))
             }
         };
         if i >= count && error <= 0.0 {
@@ -691,7 +687,7 @@ pub(super) fn residuals(
     let protruding = held.par_iter_mut().map(|held| {
         let ball = interpolated(mesh, held);
         let enough = ball.radius - tolerance;
-        let depth = goal.depth_of_moved(ball.centre, enough, FARTHER, &mut held.known)?;
+        let depth = goal.depth_of_moved(ball.centre, enough, &mut held.known)?;
         let [x, y, z] = depth.gradient.to_array();
         let Held { primitive, weights, .. } = *held;
         Some(Row {

@@ -6,18 +6,18 @@
 //! inside that no primitive holds.
 //!
 //! 1. *Start.* The initial medial mesh, of `samples` samples at least, simplified by another method (Q-MAT) to
-//!    `start` spheres, five times the target up to 2,500, or three times it, whichever is most (`start.rs`).
+//!    `start` spheres, five times the target up to 2,500, or three times it, whichever is most (this file).
 //! 2. *Residuals* (`goal.rs`): at samples of the surface and along its sharp edges `sigma`; at points of the primitives how far their
 //!    ball protrudes; at interior points how far they are from being held.
-//! 3. *Descent* (`rounds.rs`): Levenberg-Marquardt on all spheres at once for a power of the residuals,
+//! 3. *Descent* (`descent.rs`, `block_cholesky.rs`): Levenberg-Marquardt on all spheres at once for a power of the residuals,
 //!    with a sparse Cholesky factorisation. A step that would take a centre out of the
-//!    solid, fold a face over or make one cross another is taken back there (`collapse.rs`).
+//!    solid, fold a face over or make one cross another is taken back there (`guard.rs`).
 //! 4. *Collapse* (`collapse.rs`): passes of the cheapest edges, priced by the samples that their stars
 //!    serve; a few steps of 3 after each pass, at the power 4. Within five times the target, the places of the
 //!    largest errors join the samples after each pass, and after each swap of 5.
-//! 5. *Swap* (`start.rs`): spheres are inserted where the error is largest, and as many edges collapsed
+//! 5. *Swap* (`swap.rs`): spheres are inserted where the error is largest, and as many edges collapsed
 //!    where it hurts least. Only the spheres around them move then (`settle`).
-//! 6. *Rounds* (`rounds.rs`): steps of 3 at powers up to 32, between which the largest errors, found by
+//! 6. *Rounds* (this file, `witnesses.rs`): steps of 3 at the power 32, between which the largest errors, found by
 //!    local ascent and a sweep of both sides, join the samples, and balls are watched where the union came out of the solid;
 //!    then swaps as in 5, each with a second chance, and rounds again. The state
 //!    with the least measured error is the result.
@@ -47,25 +47,31 @@
 //! If the shape has an external initial medial mesh, that is the start. If it has no more spheres than requested, its
 //! connectivity stays as it is and its spheres are moved (step 6 without swaps).
 
+mod block_cholesky;
 mod collapse;
+mod descent;
 mod goal;
-mod rounds;
-mod start;
+mod guard;
+mod swap;
 #[cfg(test)]
 mod tests;
+mod witnesses;
 
 use std::ops::Bound;
 use std::sync::Arc;
 
-use goal::Goal;
-use medial::complex::{MedialMesh, crossing_faces};
+use descent::{Descent, Objective};
+use goal::{Goal, Points};
+use medial::complex::{MedialMesh, betti, crossing_faces};
+use medial::metrics::topology_warning;
 use medial::shape::Shape;
 use medial::simplifier::{
     Diagnostics, Level, MedialSimplifier, MethodInfo, NativeLevel, ParamFields, Params, RunContext,
     Simplification, Simplified, SimplifyError,
 };
-use rounds::{Descent, Objective, Polish, State, Witnesses};
-use start::Start;
+use medial::surface::Sampling;
+use swap::swapped;
+use witnesses::Witnesses;
 
 use crate::levels::{checked, level_within, some_spheres, within};
 use crate::{Prepared, Result};
@@ -73,24 +79,24 @@ use crate::{Prepared, Result};
 /// Spheres of [`Level::Published`].
 const USUAL: usize = 100;
 
-/// Spheres that are placed together at most, the start's included: memory and time stay bounded.
+/// Limit of the spheres that are placed together, those of the start included. Bounds memory and time.
 const MOST: usize = 15_000;
 
-/// While there are more than this many times the target, collapses are made in large passes.
+/// Spheres for each sphere of the target: above it passes are large, and a start has at least as many.
 const MANY: usize = 3;
 
-/// The power until the last rounds. With squares, the steps after a pass let a single ball protrude ever farther,
-/// up to faces across a hole.
+/// Exponent of the residuals until the last rounds. With 2, single balls protrude ever farther after a
+/// pass, up to faces across a hole.
 const POWER: i32 = 4;
 
-/// The share of spheres that a pass leaves, far from the target and near to it.
+/// Share of the spheres that a pass leaves, far from the target and near to it.
 const LEFT: [f64; 2] = [0.4, 0.6];
 
-/// Steps after a pass, far from the target and near to it.
-const STEPS: [usize; 2] = [2, 4];
+/// Steps of the descent after a pass, far from the target and near to it.
+const PASS_STEPS: [usize; 2] = [2, 4];
 
-/// Swaps before the rounds.
-const SWAPS: usize = 4;
+/// Limit of the swaps before the rounds.
+const FIRST_SWAPS: usize = 4;
 
 /// The method, with another one that makes its start.
 pub struct Tight {
@@ -221,7 +227,7 @@ fn reduced<'a>(
     witnesses: &mut Witnesses<'a>,
     run: &RunContext,
 ) -> Result<Descent<'a>> {
-    descent.run(Objective::power(POWER, descent.largest()), STEPS[1], run)?;
+    descent.run(Objective::power(POWER, descent.largest()), PASS_STEPS[1], run)?;
     while descent.mesh.spheres.len() > count {
         let spheres = descent.mesh.spheres.len();
         let near = usize::from(spheres <= MANY * count);
@@ -230,7 +236,7 @@ fn reduced<'a>(
         let Some(smaller) = passed(&descent, target, near, run)? else { break };
         descent = smaller;
         if near == 1 {
-            witnesses.measure(&mut descent, 0.0)?;
+            witnesses.join(&mut descent, 0.0)?;
         }
     }
     Ok(descent)
@@ -243,9 +249,9 @@ fn passed<'a>(
     near: usize,
     run: &RunContext,
 ) -> Result<Option<Descent<'a>>> {
-    let Some(passed) = collapse::pass(descent, target, near == 1) else { return Ok(None) };
+    let Some(passed) = collapse::pass(descent, target, near == 1, run)? else { return Ok(None) };
     let mut smaller = Descent::new(descent.goal, descent.points.clone(), passed.mesh)?;
-    smaller.run(Objective::power(POWER, smaller.largest()), STEPS[near], run)?;
+    smaller.run(Objective::power(POWER, smaller.largest()), PASS_STEPS[near], run)?;
     Ok(Some(smaller))
 }
 
@@ -256,20 +262,322 @@ fn swapped_often<'a>(
     run: &RunContext,
 ) -> Result<Descent<'a>> {
     let mut each = (descent.mesh.spheres.len() / 12).max(2);
-    descent.run(Objective::power(POWER, descent.largest()), STEPS[1], run)?;
+    descent.run(Objective::power(POWER, descent.largest()), PASS_STEPS[1], run)?;
     let judge = Objective::power(8, descent.largest());
-    for _ in 0..SWAPS {
-        let trial = start::swapped(&descent, each, 0, run)?;
+    for _ in 0..FIRST_SWAPS {
+        let trial = swapped(&descent, each, 0, run)?;
         match trial.filter(|trial| trial.value(&judge) < descent.value(&judge)) {
             Some(trial) => {
                 descent = trial;
-                witnesses.measure(&mut descent, 0.0)?;
+                witnesses.join(&mut descent, 0.0)?;
             }
             None if each > 1 => each /= 2,
             None => break,
         }
     }
     Ok(descent)
+}
+
+// ----------------------------------------------------------------------------
+// Step 1: the medial mesh that everything starts from.
+
+/// Spheres of the start for each sphere of the target, up to [`MOST_NEEDED`]. With three times 500
+/// spheres the mean error was a seventh larger.
+const ENOUGH: usize = 5;
+/// Limit of the spheres of the start that [`ENOUGH`] sets.
+const MOST_NEEDED: usize = 2_500;
+
+/// Samples of a surface that crosses itself, which has no conforming triangulation.
+const OF_CROSSING: usize = 20_000;
+
+/// A start: the initial medial mesh of a shape, with a method that simplifies it.
+struct Start {
+    shape: Shape,
+    starter: Arc<dyn MedialSimplifier>,
+    least: usize,
+    betti: [u64; 3],
+}
+
+impl Start {
+    /// Adds samples to a coarse surface.
+    ///
+    /// # Errors
+    /// When the samples do not span space, or the given mesh has no sphere.
+    fn new(
+        shape: &Shape,
+        starter: Arc<dyn MedialSimplifier>,
+        params: &TightParams,
+    ) -> Result<Self> {
+        // Built here, so that they count as substrates of the shape.
+        shape.surface_tree()?;
+        shape.inside_test();
+        let finer = match shape.options().sampling {
+            _ if shape.has_given_initial() => None,
+            Sampling::Conforming { least } => {
+                let samples = shape.mesh().vertices.len().max(least);
+                (samples < params.samples).then_some(Sampling::Conforming { least: params.samples })
+            }
+            _ => None,
+        };
+        let mut shape = finer.map_or_else(|| shape.clone(), |finer| shape.resampled(finer));
+        let mut initial = shape.initial()?;
+        if shape.sampling_warning().is_some() {
+            shape = shape.resampled(Sampling::BlueNoise { count: OF_CROSSING, seed: 0 });
+            initial = shape.initial()?;
+        }
+        Ok(Self { betti: betti(&initial), shape, starter, least: params.start })
+    }
+
+    /// Adds its warnings and counts.
+    fn describe(&self, diagnostics: &mut Diagnostics) {
+        diagnostics.count("samples_of_the_start", self.shape.samples().len());
+        if let Some(warning) = topology_warning(self.betti, self.shape.expected_betti()) {
+            diagnostics.warn(format!("the start is wrong, and so is the result: {warning}"));
+        }
+    }
+
+    /// The start for a number of spheres.
+    ///
+    /// # Errors
+    /// Those of the other method.
+    fn mesh(
+        &self,
+        count: usize,
+        run: &RunContext,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<MedialMesh> {
+        let [few, many] = [MANY, ENOUGH].map(|times| times.saturating_mul(count));
+        let wanted = self.least.max(few).max(many.min(MOST_NEEDED));
+        let enough = if self.shape.has_given_initial() { count } else { wanted };
+        self.simplified(wanted, enough, run, diagnostics)
+    }
+
+    /// A start of `wanted` spheres, or the initial medial mesh if it has at most `enough`.
+    ///
+    /// # Errors
+    /// Those of the other method.
+    fn simplified(
+        &self,
+        wanted: usize,
+        enough: usize,
+        run: &RunContext,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<MedialMesh> {
+        let initial = self.shape.initial()?;
+        let mesh = if initial.spheres.len() <= enough {
+            MedialMesh::clone(&initial)
+        } else {
+            let mut levels = self.starter.prepare(&self.shape, &Params::none(), run)?;
+            let found = levels.at(Level::Spheres(wanted))?;
+            // More spheres are left than wanted where nothing more can be collapsed.
+            if found.mesh.spheres.len() > wanted {
+                found
+                    .diagnostics
+                    .warnings
+                    .into_iter()
+                    .for_each(|warning| diagnostics.warn(warning));
+            }
+            found.mesh
+        };
+        Ok(MedialMesh { contacts: None, ..mesh })
+    }
+}
+
+// ----------------------------------------------------------------------------
+// Step 6: higher and higher powers, with witnesses of the largest errors joining in between.
+//
+// 1. Steps at the powers 4 and 8.
+// 2. Rounds: the places of the largest errors join the samples as witnesses, then steps at the power 32
+//    plus `lambda` times the mean.
+// 3. Swaps of a few spheres, and later of one, from the best state so far. Only the spheres around them move at
+//    first; where that lowers the sum of the powers all spheres take a step, and the error is measured. If it is
+//    little larger than before, its places join as witnesses, and a few more steps follow: without this, most swaps
+//    that lower the errors at samples fail by an error between them.
+// 4. Rounds as in 2, with the witnesses that were found meanwhile.
+//
+// The result is the state of the least measured error.
+
+/// Powers and steps before the first round.
+const WARM: [(i32, usize); 2] = [(4, 9), (8, 14)];
+
+/// Power of the rounds and of the swaps between them.
+const ROUND_POWER: i32 = 32;
+
+/// Steps of the descent in a round.
+const ROUND_STEPS: usize = 8;
+
+/// Share by which a round or a swap has to lower the error to count as a gain.
+const GAIN: f64 = 0.01;
+
+/// Consecutive rounds without a gain that are accepted.
+const PATIENCE: usize = 2;
+
+/// Limit of the swaps after the rounds.
+const MAX_SWAPS: usize = 24;
+/// Consecutive swaps of one sphere without a gain that end the search.
+const MAX_FAILURES: usize = 6;
+
+/// Spheres for each sphere that the first swap replaces. Later swaps replace fewer, and then one.
+const FIRST_SHARE: usize = 25;
+
+/// Steps of all spheres after a swap, and further ones if its error is below [`CHANCE`].
+const SWAP_STEPS: [usize; 2] = [1, 4];
+/// Limit of the error of a swap for further steps, in least errors so far.
+const CHANCE: f64 = 1.6;
+
+/// The last rounds on one goal.
+struct Polish<'a> {
+    goal: &'a Goal,
+    params: &'a TightParams,
+    run: &'a RunContext,
+    /// Whether connectivity may change.
+    swaps: bool,
+    /// The error bound, if there is one: far from it no swaps follow.
+    bound: Option<f64>,
+}
+
+/// A mesh with its measured error.
+#[derive(Clone)]
+struct State {
+    mesh: MedialMesh,
+    error: f64,
+}
+
+impl<'a> Polish<'a> {
+    /// Runs all rounds.
+    ///
+    /// # Errors
+    /// When the run is cancelled, or the mesh cannot be measured.
+    fn run(
+        &self,
+        mut descent: Descent<'a>,
+        mut witnesses: Witnesses<'a>,
+        diagnostics: &mut Diagnostics,
+    ) -> Result<State> {
+        for (power, steps) in WARM {
+            descent.run(Objective::power(power, descent.largest()), steps, self.run)?;
+        }
+        let error = witnesses.join(&mut descent, f64::INFINITY)?;
+        let (mut best, points) = self.rounds(descent, error, &mut witnesses)?;
+        if self.swaps && !self.bound.is_some_and(|bound| is_far(bound, best.error)) {
+            let from = self.at(&best, points)?;
+            let (from, helped) = self.swapped(from, &mut best, &mut witnesses)?;
+            diagnostics.count("swaps_that_helped", helped);
+            // With all the witnesses that were found meanwhile.
+            let (again, _) = self.rounds(from, best.error, &mut witnesses)?;
+            if again.error < best.error {
+                best = again;
+            }
+        }
+        Ok(best)
+    }
+
+    /// A descent from a state.
+    fn at(&self, state: &State, points: Points) -> Result<Descent<'a>> {
+        Descent::new(self.goal, points, state.mesh.clone())
+    }
+
+    /// Step 2. Returns the best state, and the points with all witnesses.
+    fn rounds(
+        &self,
+        from: Descent<'a>,
+        mut error: f64,
+        witnesses: &mut Witnesses<'_>,
+    ) -> Result<(State, Points)> {
+        let mut best = State { mesh: from.mesh, error };
+        let mut descent = self.at(&best, from.points)?;
+        let mut idle = 0;
+        for _ in 0..self.params.rounds {
+            let objective = self.objective(error);
+            descent.run(objective, ROUND_STEPS, self.run)?;
+            error = witnesses.join(&mut descent, f64::INFINITY)?;
+            idle = if error < (1.0 - GAIN) * best.error { 0 } else { idle + 1 };
+            if error < best.error {
+                best = State { mesh: descent.mesh.clone(), error };
+            }
+            if idle > PATIENCE {
+                break;
+            }
+        }
+        Ok((best, descent.points))
+    }
+
+    /// Step 3, from the best state. Returns the new one with all witnesses, and how many swaps helped.
+    fn swapped(
+        &self,
+        mut from: Descent<'a>,
+        best: &mut State,
+        witnesses: &mut Witnesses<'_>,
+    ) -> Result<(Descent<'a>, usize)> {
+        let mut each = (best.mesh.spheres.len() / FIRST_SHARE).max(1);
+        let (mut skipped, mut idle, mut helped) = (0, 0, 0);
+        for _ in 0..MAX_SWAPS {
+            let objective = self.objective(best.error);
+            let trial = swapped(&from, each, skipped, self.run)?;
+            let mut error = f64::INFINITY;
+            let mut is_kept = false;
+            if let Some(mut trial) = trial {
+                error = self.tried(&mut trial, from.value(&objective), best.error, witnesses)?;
+                is_kept = error < best.error;
+                if !is_kept {
+                    from.join_new_of(&trial.points)?;
+                } else {
+                    from = trial;
+                }
+            }
+            if error < (1.0 - GAIN) * best.error {
+                idle = 0;
+            } else if each == 1 {
+                idle += 1;
+            }
+            if error < best.error {
+                *best = State { mesh: from.mesh.clone(), error };
+            }
+            if is_kept {
+                (helped, skipped) = (helped + 1, 0);
+            } else if each > 1 {
+                // Fewer at once, then one at another place.
+                each /= 2;
+            } else {
+                skipped += 1;
+            }
+            if idle >= MAX_FAILURES {
+                break;
+            }
+        }
+        Ok((from, helped))
+    }
+
+    /// The measured error after a swap and steps of all spheres; infinite if the value is not below `value`.
+    ///
+    /// Where it is little larger than the least so far, mostly at places without a sample, the witnesses of these
+    /// places join, and a few steps more are taken.
+    fn tried(
+        &self,
+        trial: &mut Descent<'a>,
+        value: f64,
+        least: f64,
+        witnesses: &mut Witnesses<'_>,
+    ) -> Result<f64> {
+        let objective = self.objective(least);
+        trial.run(objective, SWAP_STEPS[0], self.run)?;
+        // A value that is not a number is not below.
+        let is_below = trial.value(&objective) < value;
+        if !is_below {
+            return Ok(f64::INFINITY);
+        }
+        let mut error = witnesses.join(trial, least)?;
+        if error >= least && error < CHANCE * least {
+            trial.run(objective, SWAP_STEPS[1], self.run)?;
+            error = witnesses.join(trial, least)?;
+        }
+        Ok(error)
+    }
+
+    /// A little below the error counts as one, so that larger ones weigh heavily.
+    fn objective(&self, error: f64) -> Objective {
+        Objective { power: ROUND_POWER, mean: self.params.lambda, scale: 0.9 * error }
+    }
 }
 
 // ----------------------------------------------------------------------------
@@ -290,10 +598,10 @@ medial::parameters! {
     }
 }
 
-/// Most samples that are added.
+/// Upper limit of the parameter `samples`.
 const MOST_SAMPLES: usize = 200_000;
 
-/// Most rounds.
+/// Upper limit of the parameter `rounds`.
 const MOST_ROUNDS: usize = 1_000;
 
 impl TightParams {
@@ -312,41 +620,46 @@ impl TightParams {
 // One descent through the counts, until the largest error at samples says that the bound is near. From its meshes
 // the rounds are made for the count that is reached, and for one or two that its error foretells.
 
-/// The descent ends where the largest error at samples is this many times the error aimed at: swaps and rounds
-/// lower it by about as much.
+/// Largest error at samples at which the descent ends, in errors aimed at. Swaps and rounds lower it by
+/// about this factor.
 const WATCHED: f64 = 1.9;
 
-/// With an error this many times below that, it takes large passes.
+/// Factor below that error from which passes are large.
 const SMALL: f64 = 1.5;
 
-/// A state whose error is this many times above the range [`NEAR`] before any round is given up.
+/// Factor above the range [`NEAR`] from which a state is given up before any round.
 const FAR: f64 = 6.0;
 
-/// From a count within the bound, the next one is smaller by this power of the error. From a count that misses it, the next
-/// one is larger by the power `MORE`, within the limits `GROWTH`. That is generous, because each miss costs a trial.
+/// Exponent of the error, by which the next count after one within the bound is smaller.
 const RATE: f64 = 0.9;
+/// Exponent of the error, by which the next count after a miss is larger. Generous, because each miss
+/// costs a trial.
 const MORE: f64 = 1.3;
+/// Smallest and largest factor of the count after a miss.
 const GROWTH: [f64; 2] = [1.15, 1.6];
 
-/// The next smaller count is at least this share of one within the bound.
+/// Smallest share of a count within the bound that the next count has.
 const LEAST_SHARE: f64 = 0.35;
 
-/// An error outside this range, in bounds, is far from the bound: swaps and rounds change it by less.
+/// Range of errors that swaps and rounds can bring to the bound, in bounds.
 const NEAR: [f64; 2] = [0.5, WATCHED];
 
-/// Between a count that holds the bound and one that does not, this share of the error is aimed at.
+/// Error aimed at between a count within the bound and one that misses it, as a share of the first aim.
 const CLOSE: f64 = 0.97;
 
-/// Counts that are tried, if one of them is within the bound, and more where none missed it or it is this many times the
-/// largest that did. A count above this share of it is not worth a trial.
+/// Limit of the tried counts once one is within the bound: where another missed it closely, and
+/// elsewhere.
 const TRIALS: [usize; 2] = [3, 5];
+/// Ratio of a count within the bound to the largest miss, up to which that miss is close.
 const APART: f64 = 1.25;
+/// Share of a count within the bound above which another one is not worth a trial.
 const ALIKE: f64 = 0.93;
 
-/// The measured error that is aimed at, a share of the bound, and the width of the certificate, another one.
+/// Measured error that is aimed at, as a share of the bound.
 const AIM: f64 = 0.97;
+/// Width of the certificate, as a share of the bound.
 const WIDTH: f64 = 0.01;
-/// A smaller bound, a fraction of the diagonal, is refused: no count of spheres in reach keeps it.
+/// Smallest bound, a fraction of the diagonal. No number of spheres in reach keeps a smaller one.
 const LEAST: f64 = 1e-5;
 
 /// The search for one bound.
@@ -462,7 +775,7 @@ impl Within<'_> {
             let spheres = mesh.spheres.len();
             bounded(spheres)?;
             let mut descent = Descent::new(goal, goal.points(MOST), mesh)?;
-            descent.run(Objective::power(POWER, descent.largest()), STEPS[1], run)?;
+            descent.run(Objective::power(POWER, descent.largest()), PASS_STEPS[1], run)?;
             let mut meshes = vec![(descent.mesh.clone(), descent.largest())];
             // The start of a flat solid can be worse than its coarser meshes.
             let mut is_below = descent.largest() < limit;
@@ -500,7 +813,7 @@ impl Within<'_> {
         let descent = Descent::new(goal, goal.points(count), mesh.clone())?;
         let mut witnesses = Witnesses::new(goal)?;
         let mut descent = reduced(descent, count, &mut witnesses, run)?;
-        let error = witnesses.measure(&mut descent, f64::INFINITY)?;
+        let error = witnesses.join(&mut descent, f64::INFINITY)?;
         if error < NEAR[0] * self.bound || error > FAR * NEAR[1] * self.bound {
             return Ok(State { mesh: descent.mesh, error });
         }

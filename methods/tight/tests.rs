@@ -7,16 +7,13 @@ use medial::surface::TriMesh;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::collapse::{Guard, Passed, Still, pass, settle};
+use super::block_cholesky::{Normal, Pattern};
+use super::collapse::{Passed, pass};
+use super::descent::{Descent, Objective};
 use super::goal::{Goal, Row, vertices};
-use super::rounds::{Descent, Normal, Objective, Pattern};
-use super::start::{Sheets, swapped};
-
-fn shape(id: &str, resolution: u32) -> Shape {
-    let mesh = medial_datasets::find(id).expect("in the catalogue").mesh(resolution);
-    let report = medial::surface::validate(&mesh).expect("built-in shapes are solids");
-    Shape::new(id, &mesh, report, ShapeOptions::default()).expect("an extent")
-}
+use super::guard::{Guard, Sheets, Still};
+use super::swap::{settle, swapped};
+use crate::test_shape as shape;
 
 /// Parameters that are good enough for simple shapes, and quick.
 fn quick() -> Params {
@@ -176,7 +173,8 @@ fn an_edited_mesh_has_the_residuals_of_a_new_one() {
     let shape = shape("bracket", 6);
     let goal = Goal::new(&shape, 0).unwrap();
     let before = Descent::new(&goal, goal.points(40), start(&shape, 40)).unwrap();
-    let Passed { mesh, of } = pass(&before, 30, true).expect("edges are left");
+    let Passed { mesh, of } =
+        pass(&before, 30, true, &RunContext::default()).unwrap().expect("edges are left");
     assert!(mesh.spheres.len() < 40 && of.contains(&None));
     let edited = before.edited(mesh.clone(), &of).unwrap();
     let anew = Descent::new(&goal, before.points.clone(), mesh).unwrap();
@@ -275,18 +273,6 @@ fn a_bound_is_held_by_the_judge_and_with_fewer_spheres_if_it_is_wider() {
         let found = levels.at(Level::Native(nonsense));
         assert!(matches!(found, Err(SimplifyError::Level(_))), "{nonsense}");
     }
-}
-
-/// The error of a flat solid falls in a step from a few per cent to almost none, which no interpolation foretells.
-#[test]
-fn a_bound_of_a_flat_solid_takes_few_spheres() {
-    let shape = shape("bracket", 30);
-    let mut params = quick();
-    params.set("samples", "1000");
-    let tight = crate::find("tight").unwrap();
-    let mut levels = tight.prepare(&shape, &params, &RunContext::default()).unwrap();
-    let found = levels.at(Level::Native(0.01)).unwrap();
-    assert!(found.mesh.spheres.len() < 60, "{}", found.mesh.spheres.len());
 }
 
 #[test]

@@ -52,7 +52,7 @@
 //!
 //! - Both programs refit another energy than they cluster by: the Euclidean rows are multiplied by `lambda`
 //!   instead of its square root, and the plane distances of a point are summed before they are squared. So
-//!   does the default. `refit=energy` minimises the energy above, and has the larger errors at 100 spheres.
+//!   does this method.
 //! - `points=auto` takes samples where the mesh has fewer than 25 vertices for each requested sphere.
 //! - The refit starts from the current sphere. CGAL's starts from memory that was never set. A
 //!   step that would raise the sum of errors is halved.
@@ -71,8 +71,7 @@
 //! # Not guaranteed
 //!
 //! Nothing holds the topology: four clusters that are adjacent in pairs give a hollow tetrahedron, and a ring
-//! of three a false triangle. `connect=faces` keeps only the triangles in which three clusters meet.
-//! Betti numbers may differ from the solid's: the evaluation reports them, and nothing repairs them. CGAL's manual
+//! of three a false triangle. Betti numbers may differ from the solid's: the evaluation reports them, and nothing repairs them. CGAL's manual
 //! does not recommend more than 300 spheres, nor CAD models.
 
 mod points;
@@ -86,7 +85,7 @@ use medial::simplifier::{
     Diagnostics, Level, Method, MethodInfo, ParamFields, RunContext, Simplification, Simplified,
     SimplifyError,
 };
-use points::{Locality, SurfacePoints};
+use points::SurfacePoints;
 use rayon::prelude::*;
 use sampling::{Ended, NONE, Solid, Tally, VariationalSampling};
 use serde::{Deserialize, Serialize};
@@ -103,8 +102,14 @@ const SAMPLES_PER_SPHERE: usize = 100;
 /// With `points=auto`, fewer vertices for each sphere than this call for samples.
 const VERTICES_PER_SPHERE: usize = 25;
 
-/// Most samples that a number of spheres requests by default: memory and time stay bounded.
-const MOST_DEFAULT_SAMPLES: usize = 100_000;
+/// Smallest number of samples.
+const LEAST_SAMPLES: usize = 20_000;
+
+/// Largest number of samples: memory and time stay bounded.
+const MOST_SAMPLES: usize = 100_000;
+
+/// Nearest samples that a sample is adjacent to, itself included.
+const NEIGHBOURS: usize = 10;
 
 /// Variational medial axis sampling as a method.
 ///
@@ -134,7 +139,7 @@ fn prepare<'s>(shape: &'s Shape, params: VmasParams, run: &RunContext) -> Prepar
         return Err(SimplifyError::unsupported(why));
     }
     run.step(0, 1)?;
-    let solid = Solid::new(shape, params.contact == Contact::Mesh)?;
+    let solid = Solid::new(shape)?;
     Ok(Box::new(PreparedVmas { shape, solid, params, run: run.clone() }))
 }
 
@@ -165,7 +170,7 @@ impl Simplification for PreparedVmas<'_> {
         });
         let mut sampling = VariationalSampling::new(&points, &self.solid, params);
         let ended = sampling.run(target, &self.run)?;
-        let mesh = sampling.mesh(self.params.connect)?;
+        let mesh = sampling.mesh()?;
         let mut diagnostics = Diagnostics::default();
         sampling.tally.describe(points.len(), &mut diagnostics);
         explain(requested, target, mesh.spheres.len(), ended, &mut diagnostics);
@@ -176,12 +181,12 @@ impl Simplification for PreparedVmas<'_> {
 impl PreparedVmas<'_> {
     /// Step 0.
     fn points(&self, spheres: usize, params: VmasParams) -> Result<SurfacePoints> {
-        let (mesh, VmasParams { samples, neighbours, .. }) = (self.shape.mesh(), params);
+        let mesh = self.shape.mesh();
         let points = match params.points {
             Points::Samples => {
                 let count = spheres.saturating_mul(SAMPLES_PER_SPHERE);
-                let count = count.min(MOST_DEFAULT_SAMPLES).max(samples);
-                SurfacePoints::of_samples(mesh, count, self.run.seed, neighbours)
+                let count = count.clamp(LEAST_SAMPLES, MOST_SAMPLES);
+                SurfacePoints::of_samples(mesh, count, self.run.seed, NEIGHBOURS)
             }
             _ => SurfacePoints::of_vertices(mesh),
         };
@@ -208,9 +213,8 @@ fn explain(
         };
         diagnostics.warn(format!("{instead}: {why}"));
     } else if target < requested {
-        diagnostics.warn(format!(
-            "{instead}: more than {target} need more surface points than there are (samples)"
-        ));
+        diagnostics
+            .warn(format!("{instead}: more than {target} need more surface points than there are"));
     } else if ended == Ended::IterationLimit {
         diagnostics.warn("the limit of rounds was reached, and the error is not at rest");
     }
@@ -241,21 +245,9 @@ medial::parameters! {
         /// Surface points: the vertices of the mesh (the authors), area-uniform samples (CGAL), or the
         /// vertices where there are enough for the requested spheres.
         points: Points = Points::Auto, "auto, vertices or samples";
-        /// Smallest number of samples; 100 for each sphere if that is more, up to 100000.
-        samples: usize = 20_000, "samples";
-        /// Nearest samples that a sample is adjacent to, itself included.
-        neighbours: usize = 10, "samples";
         /// Weight of the Euclidean part of the energy, above 0 and at most 1; with a small one,
         /// spheres reach into features.
         lambda: f64 = 0.2, "pure number";
-        /// The refit minimises the objective of both published programs (lambda squared, plane distances summed
-        /// before they are squared), or the energy as written.
-        refit: Refit = Refit::Published, "published or energy";
-        /// A shrinking ball touches surface points, or the mesh: exact, but slower.
-        contact: Contact = Contact::Samples, "samples or mesh";
-        /// Faces: all triples of spheres adjacent in pairs (published), or only where three clusters
-        /// meet.
-        connect: Connect = Connect::Cliques, "cliques or faces";
         /// Largest number of rounds.
         iterations: usize = 1_000, "rounds";
     }
@@ -273,39 +265,6 @@ pub enum Points {
     Vertices,
 }
 
-/// The objective of the refit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Refit {
-    /// The energy that clustering and errors use.
-    Energy,
-    /// That of both published programs: `lambda` squared, plane distances summed before they are squared.
-    Published,
-}
-
-/// The points that a shrinking ball may touch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Contact {
-    /// The surface points.
-    Samples,
-    /// The triangles of the surface.
-    Mesh,
-}
-
-/// Which triangles of adjacent spheres are faces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Connect {
-    /// All three spheres that are adjacent in pairs.
-    Cliques,
-    /// Those whose clusters meet: three mutually adjacent surface points, one of each.
-    Faces,
-}
-
-/// Memory and time stay bounded.
-const MOST_SAMPLES: usize = 1_000_000;
-
 impl VmasParams {
     /// With the kind of points for a number of spheres on a mesh of `vertices` vertices.
     fn resolved(self, spheres: usize, vertices: usize) -> Self {
@@ -320,8 +279,6 @@ impl VmasParams {
     }
 
     fn validate(self) -> Result<Self> {
-        within("samples", self.samples, 100..=MOST_SAMPLES)?;
-        within("neighbours", self.neighbours, 2..=100)?;
         // Without the Euclidean part, two parallel planes leave a sphere undetermined.
         within("lambda", self.lambda, 1e-6..=1.0)?;
         within("iterations", self.iterations, 1..=100_000)?;
@@ -344,25 +301,6 @@ fn edges(points: &SurfacePoints, labels: &[u32]) -> Vec<[u32; 2]> {
     edges
 }
 
-/// The faces on these edges.
-fn faces(
-    points: &SurfacePoints,
-    labels: &[u32],
-    edges: &[[u32; 2]],
-    connect: Connect,
-) -> Vec<[u32; 3]> {
-    match (connect, &points.local) {
-        (Connect::Cliques, _) => triangles(edges),
-        (Connect::Faces, Locality::Faces(faces)) => of_labels(faces, labels),
-        (Connect::Faces, Locality::Nearest { .. }) => {
-            // Links within a cluster are in no triangle of three labels.
-            let mut between = points.links.clone();
-            between.retain(|&[v, w]| labels[v as usize] != labels[w as usize]);
-            of_labels(&triangles(&between), labels)
-        }
-    }
-}
-
 /// The triangles of a graph whose edges are ascending pairs in ascending order.
 fn triangles(edges: &[[u32; 2]]) -> Vec<[u32; 3]> {
     let on_edges = edges.par_iter().flat_map_iter(|&[a, b]| {
@@ -383,18 +321,4 @@ fn triangles(edges: &[[u32; 2]]) -> Vec<[u32; 3]> {
         found
     });
     on_edges.collect()
-}
-
-/// The labels of point triples with three different ones, ascending, in ascending order.
-fn of_labels(triples: &[[u32; 3]], labels: &[u32]) -> Vec<[u32; 3]> {
-    let labelled = triples.iter().filter_map(|triple| {
-        let mut face = triple.map(|v| labels[v as usize]);
-        face.sort_unstable();
-        // `NONE` is the largest label, so it can only be the last one.
-        (face[0] < face[1] && face[1] < face[2] && face[2] != NONE).then_some(face)
-    });
-    let mut faces: Vec<[u32; 3]> = labelled.collect();
-    faces.sort_unstable();
-    faces.dedup();
-    faces
 }

@@ -6,7 +6,7 @@ use std::ops::Range;
 use medial::Vec3;
 use medial::complex::Sphere;
 use medial::geometry::trees::{Bounds, PointTree, morton_order};
-use medial::surface::{TriMesh, sample_with_faces};
+use medial::surface::{Touched, TriMesh, sample_with_faces};
 use rayon::prelude::*;
 use wide::f64x4;
 
@@ -49,13 +49,13 @@ pub(super) struct SurfacePoints {
     pub groups: Vec<Sphere>,
 }
 
-/// Where three points are mutually adjacent.
+/// How points are adjacent.
 #[derive(Clone, Debug)]
 pub(super) enum Locality {
     /// Each point is adjacent to its `count` nearest ones, itself among them, listed one point after another.
     Nearest { count: usize, ids: Vec<u32> },
-    /// The faces of the mesh.
-    Faces(Vec<[u32; 3]>),
+    /// Along the edges of the mesh.
+    Edges,
 }
 
 /// A point of a surface with one tangent plane.
@@ -76,6 +76,11 @@ struct Unplaced {
 }
 
 impl SurfacePoints {
+    /// The points that a shrinking ball may touch.
+    pub fn touched(&self) -> Touched<'_> {
+        Touched::Points(&self.nearest, &self.positions)
+    }
+
     /// Area-uniform samples; each has the area of its face, divided among the samples on it. A face
     /// without a sample loses its area.
     pub fn of_samples(mesh: &TriMesh, count: usize, seed: u64, neighbours: usize) -> Self {
@@ -141,7 +146,6 @@ impl SurfacePoints {
         // Faces whose corner is left out join no points.
         faces.retain(|face| !face.contains(&u32::MAX));
         points.links = sides_of(&faces);
-        points.local = Locality::Faces(faces);
         points
     }
 
@@ -170,7 +174,7 @@ impl SurfacePoints {
             first_plane,
             planes: placed_planes,
             links: Vec::new(),
-            local: Locality::Faces(Vec::new()),
+            local: Locality::Edges,
             first: kept.first().map_or(0, |&v| place_of[v as usize]),
             nearest: PointTree::new(&positions),
             groups,

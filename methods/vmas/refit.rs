@@ -10,7 +10,6 @@ use medial::complex::Sphere;
 use rayon::prelude::*;
 use wide::f64x4;
 
-use super::Refit;
 use super::points::{Locality, SurfacePoints, in_lanes};
 use super::sampling::Energy;
 
@@ -96,12 +95,11 @@ impl ClusterSum {
     fn new(points: &SurfacePoints, residuals: &Residuals, cluster: &[u32], origin: Vec3) -> Self {
         let mut planes = System::default();
         let mut squares = 0.0;
-        let factor = residuals.euclidean();
+        let factor = residuals.euclidean;
         for &v in cluster {
             // The quadric is relative to `origin`, at the radius 0.
-            residuals.each_plane(points, v as usize, |PlaneSum { normal, ties, level }, weight| {
-                planes.add(normal, ties, level - normal.dot(origin), weight);
-            });
+            let PlaneSum { normal, ties, level } = residuals.sums[v as usize];
+            planes.add(normal, ties, level - normal.dot(origin));
             let position = points.positions[v as usize] - origin;
             squares += points.areas[v as usize] * position.length_squared();
         }
@@ -169,16 +167,15 @@ impl ClusterSum {
 impl System {
     /// Adds a residual that is `rest` here.
     #[inline]
-    fn add(&mut self, normal: Vec3, ties: f64, rest: f64, weight: f64) {
+    fn add(&mut self, normal: Vec3, ties: f64, rest: f64) {
         let row = [normal.x, normal.y, normal.z, ties];
         for i in 0..4 {
-            let scaled = weight * row[i];
             for j in 0..=i {
-                self.matrix[i][j] += scaled * row[j];
+                self.matrix[i][j] += row[i] * row[j];
             }
-            self.right[i] += scaled * rest;
+            self.right[i] += row[i] * rest;
         }
-        self.value += weight * rest * rest;
+        self.value += rest * rest;
     }
 
     /// The same linear residuals `y` farther: `s^T A s - 2 b . s + c` in the paper's words.
@@ -228,15 +225,14 @@ impl System {
 }
 
 // ----------------------------------------------------------------------------
-// The objective of the refit: the energy, or the objective of the published programs.
+// The objective of the refit: that of the published programs.
 
-/// The residuals of all points.
-pub(super) enum Residuals {
-    /// The energy as written.
-    Energy(Energy),
-    /// The objective of both programs: for each point one residual, a weighted sum of distances to planes, and
-    /// the Euclidean one with the square of `lambda`.
-    Published { sums: Vec<PlaneSum>, energy: Energy },
+/// The residuals of all points: for each point one weighted sum of distances to planes, and the Euclidean
+/// one with the square of `lambda`.
+pub(super) struct Residuals {
+    sums: Vec<PlaneSum>,
+    /// Weight of the squared distance to the sphere, for each unit of area.
+    euclidean: f64,
 }
 
 /// A sum of plane distances, `level - normal . c - ties r`.
@@ -260,21 +256,13 @@ impl PlaneSum {
 }
 
 impl Residuals {
-    /// Those that a parameter names.
-    pub fn new(points: &SurfacePoints, energy: Energy, refit: Refit) -> Self {
-        match refit {
-            Refit::Energy => Self::Energy(energy),
-            Refit::Published => Self::published(points, energy),
-        }
-    }
-
     /// `sum_f sqrt(a_f) (n_f . (v - c) - r)` for a vertex (the authors); for a sample the sum over itself
     /// and its nearest ones, so over itself twice, with weights `sqrt(a) / (k + 1)` (CGAL).
-    fn published(points: &SurfacePoints, energy: Energy) -> Self {
+    pub fn new(points: &SurfacePoints, energy: Energy) -> Self {
         let sums = (0..points.len()).into_par_iter().map(|v| {
             let mut sum = PlaneSum::default();
             match &points.local {
-                Locality::Faces(_) => sum.add_planes(points, v, 1.0),
+                Locality::Edges => sum.add_planes(points, v, 1.0),
                 Locality::Nearest { count, ids } => {
                     // The point itself is in its list, and counts twice, as in CGAL.
                     let factor = 1.0 / (count + 1) as f64;
@@ -286,34 +274,6 @@ impl Residuals {
             }
             sum
         });
-        Self::Published { sums: sums.collect(), energy }
-    }
-
-    /// The weight of the squared distance to the sphere, for each unit of area.
-    pub fn euclidean(&self) -> f64 {
-        match self {
-            Self::Energy(energy) => energy.lambda,
-            Self::Published { energy, .. } => energy.lambda * energy.lambda,
-        }
-    }
-
-    /// The linear residuals of a point, with their weights.
-    #[inline]
-    pub fn each_plane(
-        &self,
-        points: &SurfacePoints,
-        v: usize,
-        mut take: impl FnMut(PlaneSum, f64),
-    ) {
-        match self {
-            Self::Energy(_) => {
-                for plane in points.planes(v) {
-                    let level = plane.normal.dot(points.positions[v]);
-                    let distance = PlaneSum { normal: plane.normal, ties: 1.0, level };
-                    take(distance, points.areas[v] * plane.share);
-                }
-            }
-            Self::Published { sums, .. } => take(sums[v], 1.0),
-        }
+        Self { sums: sums.collect(), euclidean: energy.lambda * energy.lambda }
     }
 }

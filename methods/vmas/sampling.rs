@@ -6,13 +6,13 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::RunContext;
-use medial::surface::{Ball, End, InsideTest, Side, Touched, TriangleBvh, shrinking_ball};
+use medial::surface::{Ball, End, InsideTest, Side, TriangleBvh, shrinking_ball};
 use rayon::prelude::*;
 use wide::f64x4;
 
 use super::points::{GROUP, SurfacePoints, area_vector, in_lanes};
 use super::refit::{Residuals, refit};
-use super::{Connect, Points, VmasParams, edges, faces};
+use super::{Points, VmasParams, edges, triangles};
 use crate::Result;
 
 /// A round whose total error changes by less than this is at rest; a fraction of the squared longest side.
@@ -73,7 +73,7 @@ impl<'a> VariationalSampling<'a> {
     /// With one sphere: the ball of sample 0 (CGAL), or the largest ball of a vertex (the authors).
     pub fn new(points: &'a SurfacePoints, solid: &'a Solid<'a>, params: VmasParams) -> Self {
         let energy = Energy { lambda: params.lambda };
-        let residuals = Residuals::new(points, energy, params.refit);
+        let residuals = Residuals::new(points, energy);
         let labels = vec![NONE; points.len()];
         let mut tally = Tally::default();
         let ball = match params.points {
@@ -168,9 +168,9 @@ impl<'a> VariationalSampling<'a> {
     ///
     /// # Errors
     /// When a sphere is not valid.
-    pub fn mesh(&self, connect: Connect) -> Result<MedialMesh> {
+    pub fn mesh(&self) -> Result<MedialMesh> {
         let edges = edges(self.points, &self.labels);
-        let faces = faces(self.points, &self.labels, &edges, connect);
+        let faces = triangles(&edges);
         Ok(MedialMesh::from_simplices(self.spheres.clone(), edges, faces)?)
     }
 }
@@ -473,23 +473,15 @@ pub(super) struct Solid<'s> {
     inside: Arc<InsideTest>,
     /// The longest side of the bounding box, in diagonals.
     pub side: f64,
-    touches_mesh: bool,
 }
 
 impl<'s> Solid<'s> {
     /// # Errors
     /// When the surface has no face.
-    pub fn new(shape: &'s Shape, touches_mesh: bool) -> Result<Self, ShapeError> {
+    pub fn new(shape: &'s Shape) -> Result<Self, ShapeError> {
         let (tree, inside) = (shape.surface_tree()?, shape.inside_test());
         let side = shape.mesh().bounding_box().map_or(1.0, |(lo, hi)| (hi - lo).max_element());
-        Ok(Self { shape, tree, inside, side, touches_mesh })
-    }
-
-    fn touched<'a>(&'a self, points: &'a SurfacePoints) -> Touched<'a> {
-        match self.touches_mesh {
-            true => Touched::Mesh(&self.tree),
-            false => Touched::Points(&points.nearest, &points.positions),
-        }
+        Ok(Self { shape, tree, inside, side })
     }
 
     /// The medial ball of a surface point; `None` where the faces around a vertex cancel.
@@ -498,7 +490,7 @@ impl<'s> Solid<'s> {
         if n == Vec3::ZERO {
             return None;
         }
-        Some(shrinking_ball(p, n, self.side, self.touched(points))).filter(is_medial)
+        Some(shrinking_ball(p, n, self.side, points.touched())).filter(is_medial)
     }
 
     /// The medial ball of the surface point nearest to a fitted centre; `None` where there is none. The fitted
@@ -514,7 +506,7 @@ impl<'s> Solid<'s> {
         } else {
             area_vector(self.shape.mesh(), closest.face as usize).try_normalize()?
         };
-        let ball = shrinking_ball(closest.point, outward, self.side, self.touched(points));
+        let ball = shrinking_ball(closest.point, outward, self.side, points.touched());
         is_medial(&ball).then_some(ball)
     }
 }

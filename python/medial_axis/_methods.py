@@ -27,10 +27,7 @@ class Options(TypedDict, total=False):
 class Angle(Options, total=False):
     """Options of `angle`."""
 
-    variant: Literal["vertex", "facet", "grid", "homotopy"]
-    at: Literal["barycentre", "minimum"]
-    resolution: float  # voxels
-    size: Literal["sampling", "ranking"]
+    variant: Literal["vertex", "facet", "homotopy"]
     theta: float  # degrees of separation angle
 
 
@@ -38,7 +35,6 @@ class Lambda(Options, total=False):
     """Options of `lambda`."""
 
     variant: Literal["vertex", "cell"]
-    leftovers: bool  # true or false
 
 
 class DeyZhao(Options, total=False):
@@ -46,19 +42,14 @@ class DeyZhao(Options, total=False):
 
     theta: float  # degrees
     rho: float  # pure number
-    condition: Literal["both", "angle", "ratio"]
-    size: Literal["density", "ranking"]
-    inside: Literal["vertices", "edge"]
 
 
 class Qmat(Options, total=False):
     """Options of `qmat`."""
 
     k: float  # squared fraction of the diagonal
-    boundary: Literal["paper", "legacy", "none"]
     k_boundary: float  # pure number
     topology_from: float | Literal["all", "never", "auto"]  # spheres, or all, never or auto
-    singular_ratio: float  # pure number in [0, 1)
 
 
 class Pmat(Options, total=False):
@@ -69,17 +60,10 @@ class Hem(Options, total=False):
     """Options of `hem`."""
 
     inside: Literal["depth", "surface"]
-    sides: Literal["one", "both"]
-    blocking: Literal["homotopy", "neighbours"]
 
 
 class Sat(Options, total=False):
     """Options of `sat`."""
-
-    radius_factor: float  # pure number
-    jitter: float  # fraction of the radius
-    sat_angle: float  # degrees of object angle, 0 for no filter
-    size: Literal["scale", "density"]
 
 
 class SatPairwise(Options, total=False):
@@ -89,63 +73,29 @@ class SatPairwise(Options, total=False):
 class TamHeidrich(Options, total=False):
     """Options of `tam-heidrich`."""
 
-    t_t: int  # triangles
     t_t_rounds: int  # rounds
     drop: float  # share
     t_v: str | float  # per cent of the solid's volume, one for each round
-    topology: Literal["volume", "all", "none"]
-    axis: Literal["auto", "union", "initial"]
-    remove: str | float  # ids of parts, separated by commas
-    radius_factor: float  # pure number
-    jitter: float  # fraction of the radius
-    merge: float  # fraction of the radius
 
 
 class Aof(Options, total=False):
     """Options of `aof`."""
 
     resolution: float | Literal["auto"]  # voxels, or auto
-    d: int  # number
-    levels: int  # number
-    samples: str | float  # numbers, separated by /
-    angle: float | Literal["auto"]  # degrees, or auto
-    mu: float | Literal["auto"]  # pure number, or auto
-    variant: Literal["plain", "homotopy", "thinning", "auto"]
-    spiral: Literal["equal-area", "classic", "auto"]
-    start: Literal["fine", "coarse", "auto"]
-    dismiss: Literal["zero", "bias", "auto"]
-    refine: bool | Literal["auto"]  # true, false or auto
-    max_memory: float  # megabytes
 
 
 class CoverageAxis(Options, total=False):
     """Options of `coverage-axis`."""
 
     select: Literal["greedy", "exact"]
-    candidates: Literal["voronoi", "poles", "random"]
     dilation: float  # fraction of the longest side
-    samples: int  # samples
-    points: int  # points
-    uniformity: float  # pure number
-    centrality: float  # pure number
-    penalty: Literal["ratio", "stand"]
-    max_iter: int  # spheres
-    size: Literal["picks", "dilation"]
-    connection: Literal["geodesic", "qmat"]
-    nodes: int  # nodes
-    time_limit: float  # seconds, 0 for none
 
 
 class Vmas(Options, total=False):
     """Options of `vmas`."""
 
     points: Literal["auto", "vertices", "samples"]
-    samples: int  # samples
-    neighbours: int  # samples
     lambda_: float  # pure number
-    refit: Literal["published", "energy"]
-    contact: Literal["samples", "mesh"]
-    connect: Literal["cliques", "faces"]
     iterations: int  # rounds
 
 

@@ -119,7 +119,7 @@ from medial_axis import MedialAxis, simplifier
 
 def calls(axis: MedialAxis, method: str, own: type) -> MedialAxis:
     axis = axis.simplify("qmat", spheres=100, k=1e-5, topology_from="never", seed=3)
-    axis = axis.simplify("vmas", spheres=100, contact="mesh", lambda_=0.3)
+    axis = axis.simplify("vmas", spheres=100, points="vertices", lambda_=0.3)
     axis = axis.simplify(method, level="published", params={"k": 0})
     axis = axis.simplify(own, spheres=3, anything=4).simplify(spheres=2)
     axis.simplify("qmat", sheres=3)  # wrong
@@ -129,7 +129,7 @@ def calls(axis: MedialAxis, method: str, own: type) -> MedialAxis:
     axis.simplify("angle", level=60, variant="face")  # wrong
     axis.simplify("angel", level=60, theta=60)  # wrong
     axis.simplify(method, spheres=3, k=0)  # wrong
-    return axis.simplify("lambda", level=0.05, leftovers=False, params=None)
+    return axis.simplify("lambda", level=0.05, variant="cell", params=None)
 """
 
 

@@ -6,7 +6,7 @@ use super::axis_distance::{AxisOptions, PreparedAxis, prepared_axis_distance};
 use super::bounds::ROUNDING;
 use super::certificate::certify;
 use super::cover::CoverTest;
-use super::envelope::{EnvelopeOptions, sample_envelope};
+use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::error::MetricError;
 use super::evaluation::{
     AxisDistances, Certificate, Cover, Distances, Evaluation, MeanAndP95, SheetDifference,
@@ -237,7 +237,10 @@ impl Judge {
     /// As [`Judge::certify`].
     pub fn cover(&self, mesh: &MedialMesh, tolerance: f64) -> Result<Cover, MetricError> {
         let samples = self.samples()?;
-        let (mesh, union) = samples.ordered(mesh)?;
+        samples.ordered(mesh)?;
+        // Not grown: covers are proven with the radii as they are.
+        let mesh = samples.pose.in_order(mesh);
+        let union = MedialUnion::new(&mesh)?;
         let test = CoverTest::new(&self.surface, &self.tree, &self.inside);
         let [uncovered, overshoot] = match mesh.edges.is_empty() {
             true => [
@@ -252,7 +255,7 @@ impl Judge {
             burial: ROUNDING,
             seed: self.options.seed,
         };
-        let boundary = sample_envelope(&mesh, &union, &options)?;
+        let boundary = sample_envelope_in(&samples.pose, &mesh, &union, &options)?.points;
         let overshoot_at = SignedDistance::closed(&self.tree, &self.inside).batch(&boundary);
         Ok(Cover {
             uncovered,

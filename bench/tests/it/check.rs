@@ -62,19 +62,7 @@ fn every_method_passes_the_core_cases() {
 #[test]
 #[ignore = "minutes; run nightly"]
 fn variants_pass() {
-    for variant in ["facet", "homotopy"] {
-        assert_passes(check(MEDIAL, &["angle", "--set", &format!("variant={variant}")]), 1);
-    }
-    let ranking = ["angle", "--set", "variant=grid", "--set", "size=ranking"];
-    assert_passes(check(MEDIAL, &ranking), 1);
-    // The search for a sphere count that no lattice has takes minutes.
-    let slow = ["defaults", "valid-sphere", "counts"];
-    let names = medial_bench::check::cases().iter().map(|case| case.name);
-    let rest: Vec<&str> = names.filter(|name| !slow.contains(name)).collect();
-    let chosen: Vec<&str> = rest.iter().flat_map(|name| ["--case", name]).collect();
-    let (code, object) =
-        check(MEDIAL, &[&["angle", "--set", "variant=grid"], &chosen[..]].concat());
-    assert_eq!((code, object["passed"].as_u64()), (0, Some(rest.len() as u64)), "{object}");
+    assert_passes(check(MEDIAL, &["angle", "--set", "variant=facet"]), 1);
     assert_passes(check(MEDIAL, &["lambda", "--set", "variant=cell"]), 1);
     // Without a limit of rounds it takes minutes for a sphere count that it cannot reach.
     assert_passes(check(MEDIAL, &["vmas", "--set", "iterations=20"]), 1);

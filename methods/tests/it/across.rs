@@ -11,17 +11,14 @@ use crate::common::{built_in, default_shape, levels, params, shape, shape_of, wi
 fn wrong_parameters_are_refused_by_name() {
     let shape = default_shape("box");
     for (method, wrong) in [
-        ("angle", "variant=cell resolution=1 resolution=100000 at=middle theta=181 size=angle"),
-        ("lambda", "variant=facet leftovers=maybe"),
-        ("dey-zhao", "theta=0 theta=90 rho=0 rho=-8 condition=none size=many inside=all"),
-        ("qmat", "k=-1 k_boundary=-1 topology_from=some boundary=soft singular_ratio=1"),
+        ("angle", "variant=cell"),
+        ("lambda", "variant=facet"),
+        ("dey-zhao", "theta=0 theta=90 rho=0 rho=-8"),
+        ("qmat", "k=-1 k_boundary=-1 topology_from=some"),
         ("hem", "inside=both outside=depth"),
-        ("sat", "radius_factor=0 jitter=1 sat_angle=-1 sat_angle=many"),
-        ("tam-heidrich", "t_v=-1 t_v=1,many t_v=[1,101] drop=2 axis=none remove=-3 t_t=1.5"),
-        ("tam-heidrich", "radius_factor=0 jitter=1 merge=1"),
-        ("coverage-axis", "dilation=0 samples=0 nodes=0 penalty=none"),
-        ("vmas", "lambda=0 lambda=1.5 samples=99 neighbours=1 iterations=0 points=faces"),
-        ("vmas", "refit=none contact=1 connect=all"),
+        ("tam-heidrich", "t_v=-1 t_v=1,many t_v=[1,101] drop=2 t_t_rounds=1.5"),
+        ("coverage-axis", "dilation=0 select=all"),
+        ("vmas", "lambda=0 lambda=1.5 iterations=0 points=faces"),
         ("tight", "lambda=-1 samples=99 rounds=1001"),
         ("cover", "mood=sad mood=1 radii=same"),
     ] {
@@ -75,16 +72,12 @@ fn senseless_levels_are_refused() {
 #[test]
 fn larger_levels_leave_no_more_spheres() {
     let shape = default_shape("torus");
-    for (method, variant, requested) in [
-        ("aof", "plain", &[5.0, 30.0, 60.0, 90.0][..]),
-        ("aof", "homotopy", &[5.0, 30.0, 60.0, 90.0]),
-        ("aof", "thinning", &[5.0, 30.0, 60.0, 90.0]),
-        ("dey-zhao", "", &[0.5, 1.0, 2.0, 5.0]),
-        ("pmat", "", &[1.0, 1.1, 1.5, 2.0, 4.0, 1e6]),
-        ("sat", "", &[1.0, 1.1, 1.3, 1.6, 2.0]),
+    for (method, set, requested) in [
+        ("aof", &[("resolution", "40")][..], &[5.0, 30.0, 60.0, 90.0][..]),
+        ("dey-zhao", &[], &[0.5, 1.0, 2.0, 5.0]),
+        ("pmat", &[], &[1.0, 1.1, 1.5, 2.0, 4.0, 1e6]),
+        ("sat", &[], &[1.0, 1.1, 1.3, 1.6, 2.0]),
     ] {
-        let set = [("variant", variant), ("resolution", "40")];
-        let set = if variant.is_empty() { &[][..] } else { &set };
         let native: Vec<Level> = requested.iter().map(|&level| Level::Native(level)).collect();
         let mut counts = Vec::new();
         for (found, &requested) in levels(&shape, method, set, &native).into_iter().zip(requested) {
@@ -96,7 +89,7 @@ fn larger_levels_leave_no_more_spheres() {
             counts.push(found.mesh.spheres.len());
         }
         assert!(counts.is_sorted_by(|fine, coarse| fine >= coarse), "{method}: {counts:?}");
-        assert!(counts[0] > counts[counts.len() - 1], "{method} {variant}: {counts:?}");
+        assert!(counts[0] > counts[counts.len() - 1], "{method}: {counts:?}");
     }
 }
 
@@ -143,18 +136,18 @@ fn topology_is_kept_at_every_level() {
 #[test]
 fn the_number_of_threads_changes_nothing() {
     let mesh = built_in("bracket");
-    let vertices = [("points", "vertices"), ("refit", "published"), ("connect", "faces")];
+    let vertices = [("points", "vertices")];
     for (method, set) in [
         ("hem", &[][..]),
         ("hem", &[("inside", "surface")]),
         ("pmat", &[]),
         ("vmas", &[]),
         ("vmas", &vertices),
-        ("vmas", &[("contact", "mesh")]),
         ("cover", &[]),
+        ("aof", &[("resolution", "50")]),
     ] {
         let [one, two] = [1, 2].map(|threads| {
-            let requested = [60, 10].map(Level::Spheres);
+            let requested = [Level::Spheres(60), Level::Spheres(10), Level::Published];
             let found = with_threads(threads, || levels(&shape_of(&mesh), method, set, &requested));
             let found = found.into_iter().map(|level| level.expect("a count"));
             found

@@ -6,14 +6,8 @@ use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, Params, RunContext, Simplified, SimplifyError};
 use medial::surface::{self, TriMesh};
 
-pub const ANGLE: [&[(&str, &str)]; 4] = [
-    &[("variant", "facet")],
-    &[("variant", "facet"), ("at", "minimum")],
-    &[("variant", "grid")],
-    &[("variant", "homotopy")],
-];
-pub const LAMBDA: [&[(&str, &str)]; 2] =
-    [&[("variant", "cell")], &[("variant", "cell"), ("leftovers", "false")]];
+pub const FACET: &[(&str, &str)] = &[("variant", "facet")];
+pub const CELL: &[(&str, &str)] = &[("variant", "cell")];
 
 pub fn shape_of(mesh: &TriMesh) -> Shape {
     let report = surface::validate(mesh).expect("a solid");

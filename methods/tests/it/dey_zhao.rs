@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_8};
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::shape::Shape;
-use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
+use medial::simplifier::{Level, MedialSimplifier, RunContext, Simplified};
 use medial::surface::{Side, TriMesh};
 use medial_methods::dey_zhao;
 
@@ -54,41 +54,6 @@ fn a_plate_keeps_its_middle_sheet() {
     for s in kept.spheres.iter().filter(|s| (s.radius * unit - 0.05).abs() < 1e-3) {
         assert!(back(s.centre).z.abs() < 1e-3, "{:?}", back(s.centre));
     }
-}
-
-#[test]
-fn each_condition_alone_keeps_a_part_and_both_keep_the_union() {
-    let shape = shape_of(&built_in("blob", 40), "vertices");
-    let faces = |condition: &str| {
-        let mesh = at(&shape, &[("condition", condition)], Level::Published).mesh;
-        let key = |v: u32| mesh.spheres[v as usize].centre.to_array().map(f64::to_bits);
-        let mut faces: Vec<_> = mesh.faces.iter().map(|f| f.map(key)).collect();
-        faces.sort_unstable();
-        faces
-    };
-    let [both, angle, ratio] = ["both", "angle", "ratio"].map(faces);
-    let mut union = [angle.clone(), ratio.clone()].concat();
-    union.sort_unstable();
-    union.dedup();
-    assert_eq!(both, union);
-    assert!(!ratio.is_empty() && ratio.len() < angle.len());
-}
-
-#[test]
-fn a_given_mesh_is_no_voronoi_diagram() {
-    let mesh = built_in("capsule", 36);
-    let shape = shape_of(&mesh, "vertices");
-    let given = MedialMesh::clone(&shape.initial().expect("an initial medial mesh"));
-    let shape = shape_of(&mesh, "vertices").with_initial(&given);
-    let refused = dey_zhao::method().prepare(&shape, &Params::none(), &RunContext::default());
-    assert!(matches!(refused, Err(SimplifyError::Unsupported { .. })));
-}
-
-#[test]
-fn more_samples_than_there_are_points_are_not_tried() {
-    let shape = shape_of(&built_in("capsule", 36), "vertices");
-    let many = at(&shape, &[], Level::Spheres(1_000_000_000));
-    assert!(many.diagnostics.warnings.iter().any(|w| w.contains("are not tried")));
 }
 
 #[test]
@@ -309,10 +274,11 @@ fn rules() -> [(Vec<(&'static str, &'static str)>, Rule); 4] {
     let angle = Some(FRAC_PI_2 - FRAC_PI_8);
     [
         (vec![], Rule { angle, ratio: Some(8.0) }),
-        (vec![("condition", "angle")], Rule { angle, ratio: None }),
-        (vec![("condition", "ratio")], Rule { angle: None, ratio: Some(8.0) }),
+        // Thresholds that nothing passes.
+        (vec![("rho", "1e12")], Rule { angle, ratio: None }),
+        (vec![("theta", "89.9999999")], Rule { angle: None, ratio: Some(8.0) }),
         // So few samples are far apart: a ratio that decides.
-        (vec![("condition", "ratio"), ("rho", "1.5")], Rule { angle: None, ratio: Some(1.5) }),
+        (vec![("theta", "89.9999999"), ("rho", "1.5")], Rule { angle: None, ratio: Some(1.5) }),
     ]
 }
 

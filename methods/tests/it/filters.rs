@@ -2,18 +2,11 @@
 //! incidence, topology, scale.
 
 use medial::Vec3;
-use medial::complex::{MedialMesh, betti};
-use medial::geometry::enclosing_ball;
+use medial::complex::MedialMesh;
 use medial::shape::Shape;
-use medial::simplifier::{Level, RunContext, Simplified, SimplifyError};
+use medial::simplifier::{Level, RunContext, SimplifyError};
 
-use crate::common::{
-    ANGLE, LAMBDA, at, built_in, count, default_shape, levels, params, sampled, shape, shape_of,
-};
-
-/// Numbers of spheres by ranking instead of sampling.
-const BY_RANKING: [[(&str, &str); 2]; 2] =
-    [[("variant", "grid"), ("size", "ranking")], [("variant", "homotopy"), ("size", "ranking")]];
+use crate::common::{CELL, FACET, at, built_in, default_shape, levels, params, shape, shape_of};
 
 /// A solid box around the origin, in the shape's units: its half sides, descending, and how far a point
 /// is from the central rectangle.
@@ -78,7 +71,7 @@ fn spacing(shape: &Shape) -> f64 {
 fn the_axis_above_a_right_angle_is_the_central_rectangle_of_a_box() {
     let shape = shape("box", 90);
     let (cuboid, h) = (Cuboid::of(&shape), spacing(&shape));
-    for set in [ANGLE[0], ANGLE[1], &[]] {
+    for set in [FACET, &[]] {
         let mesh = at(&shape, "angle", set, Level::Native(110.0));
         assert!(!mesh.faces.is_empty());
         let closed = set.is_empty() || mesh.faces.iter().flatten().count() >= mesh.spheres.len();
@@ -99,57 +92,20 @@ fn the_axis_above_a_right_angle_is_the_central_rectangle_of_a_box() {
 }
 
 #[test]
-fn the_smallest_angle_of_a_facet_keeps_no_more_than_its_barycentre() {
-    let shape = default_shape("ellipsoid");
-    for theta in [20.0, 60.0, 120.0] {
-        let [mean, least] = [0, 1].map(|k| at(&shape, "angle", ANGLE[k], Level::Native(theta)));
-        assert!(least.spheres.len() < mean.spheres.len(), "{theta}");
-        assert!(least.spheres.iter().all(|s| mean.spheres.contains(s)), "{theta}");
-    }
-}
-
-#[test]
-fn a_grid_separates_right_angles_and_straight_ones_exactly() {
-    let mesh = built_in("box");
-    let shape = shape_of(&mesh);
-    let cuboid = Cuboid::of(&shape);
-    for resolution in ["24", "31", "64"] {
-        let side = 2.0 * cuboid.half.max_element() / resolution.parse::<f64>().expect("a number");
-        let set = [("variant", "grid"), ("resolution", resolution)];
-        for theta in [90.001, 179.9] {
-            let mesh = at(&shape, "angle", &set, Level::Native(theta));
-            let off = mesh.spheres.iter().map(|s| cuboid.off_rectangle(s.centre));
-            assert!(off.fold(0.0, f64::max) < 1.5 * side, "{resolution} {theta}");
-            assert!(cuboid.uncovered(&mesh) < 2.0 * side, "{resolution} {theta}");
-        }
-        let mesh = at(&shape, "angle", &set, Level::Native(89.999));
-        // Radii are distances, and the sheets reach the edges of the box.
-        for sphere in &mesh.spheres {
-            let room = (cuboid.half - (sphere.centre - cuboid.middle).abs()).min_element();
-            assert!((sphere.radius - room).abs() < 1e-12, "{sphere:?} has room for {room}");
-        }
-        let off = mesh.spheres.iter().map(|s| cuboid.off_rectangle(s.centre));
-        assert!(off.fold(0.0, f64::max) > cuboid.half[cuboid.thinnest], "{resolution}");
-    }
-}
-
-#[test]
 fn lambda_keeps_the_facets_of_its_table_on_a_box_and_a_plate() {
     for id in ["box", "plate"] {
         let shape = default_shape(id);
         let (cuboid, h) = (Cuboid::of(&shape), spacing(&shape));
         let half = cuboid.thickness() / 2.0;
-        for set in LAMBDA {
-            // A facet has exactly half of the thickness where its two samples are opposite.
-            let mesh = at(&shape, "lambda", set, Level::Native(half * (1.0 - 1e-9)));
-            assert!(cuboid.uncovered(&mesh) < 3.0 * h, "{id} {set:?}");
-            let beyond = (half * half + h * h).sqrt() * (1.0 + 1e-9);
-            assert!(at(&shape, "lambda", set, Level::Native(beyond)).spheres.is_empty(), "{id}");
-        }
+        // A facet has exactly half of the thickness where its two samples are opposite.
+        let mesh = at(&shape, "lambda", CELL, Level::Native(half * (1.0 - 1e-9)));
+        assert!(cuboid.uncovered(&mesh) < 3.0 * h, "{id}");
+        let beyond = (half * half + h * h).sqrt() * (1.0 + 1e-9);
+        assert!(at(&shape, "lambda", CELL, Level::Native(beyond)).spheres.is_empty(), "{id}");
         // Sheets from the edges go up to the radius sqrt 2 lambda.
         let lambda = 0.6 * half;
         if lambda > 3.0 * h {
-            let mesh = at(&shape, "lambda", LAMBDA[0], Level::Native(lambda));
+            let mesh = at(&shape, "lambda", CELL, Level::Native(lambda));
             for sphere in &mesh.spheres {
                 assert!(sphere.radius > 2.0_f64.sqrt() * (lambda - h), "{id}: {sphere:?}");
             }
@@ -160,78 +116,19 @@ fn lambda_keeps_the_facets_of_its_table_on_a_box_and_a_plate() {
 }
 
 #[test]
-fn lambda_grows_from_facets_to_edges_to_vertices() {
-    let shape = default_shape("bracket");
-    let (mesh, facets) = (shape.voronoi().expect("a mesh"), shape.facets().expect("facets"));
-    let delaunay = shape.delaunay().expect("samples in space");
-    let contacts = mesh.contacts.as_ref().expect("contacts");
-    let ball = |ids: &[u32]| {
-        let points: Vec<Vec3> = ids.iter().map(|&id| contacts.samples[id as usize]).collect();
-        enclosing_ball(&points).1
-    };
-    let grown = 1.0 + 1e-9;
-    for facet in 0..facets.len() {
-        let [p, q] = facets.ends(facet).map(|v| delaunay.point(v));
-        let polygon = facets.polygon(facet);
-        for k in 0..polygon.len() {
-            let [a, b] = [polygon[k], polygon[(k + 1) % polygon.len()]];
-            let [mine, theirs] = [a, b].map(|v| contacts.of_sphere[v as usize]);
-            let shared: Vec<u32> = mine.into_iter().filter(|s| theirs.contains(s)).collect();
-            assert!(shared.len() >= 3, "a side is dual to a triangle");
-            let (edge, vertex) = (ball(&shared), ball(&mine));
-            assert!(p.distance(q) / 2.0 <= edge * grown && edge <= vertex * grown);
-            assert!(vertex <= mesh.spheres[a as usize].radius * grown);
-        }
-    }
-}
-
-#[test]
-fn lambda_cells_are_nested_and_leftovers_come_on_top() {
+fn lambda_cells_are_nested_and_meet_counts() {
     let shape = default_shape("capsule");
     let wanted = [0.01, 0.03, 0.06, 0.1, 0.14].map(Level::Native);
-    let [with, without] = LAMBDA.map(|set| levels(&shape, "lambda", set, &wanted));
-    let meshes = |all: Vec<Result<Simplified, SimplifyError>>| -> Vec<MedialMesh> {
-        all.into_iter().map(|level| level.expect("in range").mesh).collect()
-    };
-    let (with, without) = (meshes(with), meshes(without));
-    for (full, sheets) in with.iter().zip(&without) {
-        assert!(sheets.spheres.iter().all(|s| full.spheres.contains(s)));
-        assert_eq!(full.faces.len(), sheets.faces.len());
-    }
-    for pair in with.windows(2) {
+    let found = levels(&shape, "lambda", CELL, &wanted).into_iter();
+    let meshes: Vec<MedialMesh> = found.map(|level| level.expect("in range").mesh).collect();
+    for pair in meshes.windows(2) {
         assert!(pair[1].spheres.iter().all(|s| pair[0].spheres.contains(s)));
     }
     let shape = default_shape("blob");
     for count in [700, 100, 7] {
         // Neighbours whose enclosing balls rest on the same samples have the same value.
-        let reached = at(&shape, "lambda", LAMBDA[0], Level::Spheres(count)).spheres.len();
+        let reached = at(&shape, "lambda", CELL, Level::Spheres(count)).spheres.len();
         assert!(reached <= count && reached * 10 >= count * 8, "{reached} for {count}");
-    }
-}
-
-#[test]
-fn sheets_go_without_a_change_of_topology() {
-    for id in ["sphere", "box", "plate", "capsule", "torus", "hollow-sphere", "bracket", "pair"] {
-        let shape = default_shape(id);
-        let initial = shape.voronoi().expect("a mesh");
-        let expected = betti(&initial);
-        let wanted = [0.0, 30.0, 60.0, 91.0, 120.0, 150.0, 180.0].map(Level::Native);
-        let mut last = initial.spheres.len();
-        for (level, theta) in levels(&shape, "angle", ANGLE[3], &wanted).into_iter().zip(wanted) {
-            let mesh = level.expect("in range").mesh;
-            mesh.check().expect("valid");
-            assert_eq!(betti(&mesh), expected, "{id} {theta}");
-            assert!(mesh.spheres.len() <= last, "{id} {theta}");
-            last = mesh.spheres.len();
-        }
-        for count in [last * 3, last + 1] {
-            let mesh = at(&shape, "angle", &BY_RANKING[1], Level::Spheres(count));
-            assert!(
-                mesh.spheres.len() <= count && mesh.spheres.len() * 2 > count.min(last),
-                "{id}"
-            );
-            assert_eq!(betti(&mesh), expected, "{id} {count}");
-        }
     }
 }
 
@@ -240,13 +137,7 @@ fn kept_items_among_ties_are_spread_over_the_shape() {
     // All facets of the middle sheet tie, and cut by their numbers they would be one end of it.
     let shape = default_shape("plate");
     let cuboid = Cuboid::of(&shape);
-    let all = [
-        ("angle", ANGLE[0]),
-        ("angle", &BY_RANKING[0]),
-        ("angle", &[]),
-        ("lambda", LAMBDA[1]),
-        ("lambda", &[]),
-    ];
+    let all = [("angle", FACET), ("angle", &[]), ("lambda", &[])];
     for (method, set) in all {
         let mesh = at(&shape, method, set, Level::Spheres(150));
         let uncovered = cuboid.uncovered(&mesh) / cuboid.rectangle().length();
@@ -263,7 +154,7 @@ fn variants_of_voronoi_facets_refuse_a_given_mesh() {
         let back = *shape.normalisation();
         shape_of(&mesh).with_initial(&given.to_input(&back))
     };
-    for (method, set) in [("angle", ANGLE[0]), ("angle", ANGLE[3]), ("lambda", LAMBDA[0])] {
+    for (method, set) in [("angle", FACET), ("lambda", CELL), ("dey-zhao", &[])] {
         let method = medial_methods::find(method).expect("registered");
         let refused = method.prepare(&shape, &params(set), &RunContext::default()).err();
         assert!(matches!(refused, Some(SimplifyError::Unsupported { .. })), "{set:?}");
@@ -277,16 +168,14 @@ fn variants_of_voronoi_facets_refuse_a_given_mesh() {
 #[test]
 fn counts_are_met_from_below_or_with_a_warning() {
     let shape = default_shape("bracket");
-    let all = ANGLE.iter().map(|set| ("angle", *set)).chain(LAMBDA.map(|set| ("lambda", set)));
+    let all = [("angle", FACET), ("lambda", CELL)];
     for (method, set) in all {
         let wanted = [600, 100, 20].map(Level::Spheres);
         for (found, count) in levels(&shape, method, set, &wanted).into_iter().zip([600, 100, 20]) {
             let found = found.expect("a count");
             let reached = found.mesh.spheres.len();
             assert!(reached > 0 && (reached == count || !found.diagnostics.warnings.is_empty()));
-            // Sheets end where edges without a facet hold them: these never go.
-            let is_held = set == ANGLE[3] && reached > count;
-            assert!(reached <= count || is_held, "{method} {set:?}: {reached} for {count}");
+            assert!(reached <= count, "{method} {set:?}: {reached} for {count}");
         }
         let refused = levels(&shape, method, set, &[Level::Spheres(0)]).remove(0);
         assert!(matches!(refused, Err(SimplifyError::Level(_))), "{method} {set:?}");
@@ -296,8 +185,8 @@ fn counts_are_met_from_below_or_with_a_warning() {
 #[test]
 fn the_published_level_is_announced_and_is_a_native_one() {
     let shape = default_shape("bracket");
-    let all = ANGLE.iter().map(|set| ("angle", *set)).chain(LAMBDA.map(|set| ("lambda", set)));
-    for (method, set) in all.chain([("angle", [].as_slice()), ("lambda", &[])]) {
+    let all = [("angle", FACET), ("lambda", CELL)];
+    for (method, set) in all.into_iter().chain([("angle", [].as_slice()), ("lambda", &[])]) {
         let published =
             levels(&shape, method, set, &[Level::Published]).remove(0).expect("a level");
         let warnings = &published.diagnostics.warnings;
@@ -314,43 +203,4 @@ fn the_published_level_is_announced_and_is_a_native_one() {
     });
     let longest = sides.into_iter().fold(0.0, f64::max);
     assert_eq!(lambda.native_level, Some(0.02 * longest));
-}
-
-#[test]
-fn a_number_by_sampling_is_the_native_level_of_that_sampling() {
-    let mesh = built_in("blob");
-    let shape = shape_of(&mesh);
-    for set in [ANGLE[2], ANGLE[3]] {
-        let found = levels(&shape, "angle", set, &[Level::Spheres(300)]).remove(0).expect("300");
-        assert!((294..=300).contains(&found.mesh.spheres.len()), "{set:?}");
-        let native = Level::Native(found.native_level.expect("theta"));
-        let again = if set == ANGLE[2] {
-            let thousandths = count(&found, "resolution_in_thousandths");
-            let resolution = format!("{}.{:03}", thousandths / 1000, thousandths % 1000);
-            let set = [("variant", "grid"), ("resolution", resolution.as_str())];
-            at(&shape, "angle", &set, native)
-        } else {
-            let sampling = format!("blue:{}", count(&found, "samples"));
-            at(&sampled(&mesh, &sampling), "angle", set, native)
-        };
-        assert_eq!(found.mesh, again, "{set:?}");
-    }
-}
-
-#[test]
-fn few_spheres_by_sheets_are_spread_as_well_as_by_vertices() {
-    for id in ["blob", "bracket", "torus"] {
-        let shape = default_shape(id);
-        let axis = shape.voronoi().expect("a mesh");
-        let farthest = |set| {
-            let kept = at(&shape, "angle", set, Level::Spheres(100)).spheres;
-            let far = axis.spheres.iter().map(|s| {
-                let distances = kept.iter().map(|k| k.centre.distance(s.centre));
-                distances.fold(f64::INFINITY, f64::min)
-            });
-            far.fold(0.0, f64::max)
-        };
-        let [sheets, vertices] = [ANGLE[3], &[]].map(farthest);
-        assert!(sheets <= 1.3 * vertices, "{id}: {sheets}, by vertices {vertices}");
-    }
 }

@@ -3,6 +3,7 @@
 mod across;
 mod aof;
 mod box_axis;
+mod cancel;
 mod chain;
 mod common;
 mod dey_zhao;

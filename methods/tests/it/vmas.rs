@@ -45,7 +45,7 @@ fn torus(large: f64, small: f64, around: u32, across: u32) -> TriMesh {
 fn sixteen_spheres_of_a_torus_are_a_ring() {
     let shape = shape_of(&torus(1.0, 0.3, 240, 80));
     let diagonal = shape.normalisation().diagonal;
-    for text in ["", "refit=published", "contact=mesh", "points=vertices"] {
+    for text in ["", "points=vertices"] {
         let Simplified { mesh, diagnostics, .. } = spheres(&shape, text, 16);
         assert_eq!((mesh.spheres.len(), euler(&mesh), betti(&mesh)), (16, 0, [1, 1, 0]), "{text}");
         assert!(mesh.faces.is_empty() && mesh.edges.len() == 16, "{text}");
@@ -63,7 +63,7 @@ fn sixteen_spheres_of_a_torus_are_a_ring() {
 #[test]
 fn one_sphere_of_a_ball_is_the_ball() {
     let shape = default_shape("sphere");
-    for text in ["", "points=vertices", "refit=published", "points=vertices:refit=published"] {
+    for text in ["", "points=vertices"] {
         let mesh = spheres(&shape, text, 1).mesh;
         let [ball] = mesh.spheres[..] else { panic!("one sphere") };
         let radii: Vec<f64> =
@@ -81,7 +81,7 @@ fn mean_errors_are_those_of_the_authors_program() {
     for (name, mean) in [("fertility.off", 0.234), ("threeholes.off", 0.257)] {
         let Some(path) = medial_test_support::mesh(name) else { continue };
         let shape = shape_of(&surface::read(&path).expect("a solid").mesh);
-        let result = spheres(&shape, "points=vertices:refit=published", 100);
+        let result = spheres(&shape, "points=vertices", 100);
         assert_eq!(result.mesh.spheres.len(), 100);
         let options = JudgeOptions { samples: 20_000, ..JudgeOptions::default() };
         let judge = shape.judge(None, options).expect("a judge");
@@ -141,7 +141,7 @@ fn fewer_spheres_than_requested_have_a_warning() {
     };
     for (text, requested, why) in [
         ("points=vertices", 5, "dropped"),
-        ("samples=100:iterations=3", 20, "iterations"),
+        ("points=samples:iterations=3", 20, "iterations"),
         ("points=vertices:iterations=1", 4, "iterations"),
     ] {
         for (name, mesh) in [("cube", &cube), ("tetrahedron", &tetrahedron)] {

@@ -22,7 +22,7 @@ use medial::Vec3;
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::RunContext;
 use medial::surface::{self, TriMesh, TriangleBvh};
-use medial_methods::aof::{AofParams, Solid, Sphere, Spiral, Surface, Variant, Wanted};
+use medial_methods::aof::{LatticeSetting, Solid, Sphere, Spiral, Surface, Wanted};
 use medial_oracles::{Task, bytes, numbers};
 
 /// Samples of the finest level.
@@ -61,13 +61,7 @@ fn shape(mesh: &TriMesh) -> Result<Shape, Box<dyn Error>> {
 }
 
 fn solid(shape: &Shape) -> Result<Solid<'_>, Box<dyn Error>> {
-    let params = AofParams {
-        levels: 1,
-        samples: SAMPLES.to_string(),
-        variant: Variant::Plain,
-        ..AofParams::default()
-    };
-    Ok(Solid::new(shape, params, RunContext::default())?)
+    Ok(Solid::new(shape, LatticeSetting::own(1), RunContext::default())?)
 }
 
 fn make(name: &str, resolution: u32, count: usize, file: &str) -> Outcome {
@@ -115,7 +109,7 @@ fn time(name: &str, resolution: u32) -> Outcome {
     let shape = shape(&mesh(name)?)?;
     let solid = solid(&shape)?;
     let (clock, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
-    let tally = solid.descend(resolution, Wanted::Kept)?.tally;
+    let tally = solid.descend(resolution, Wanted::All)?.tally;
     let (wall, cpu) = (clock.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
     println!("{wall:.4} {cpu:.4} {} {SAMPLES}", tally.evaluated);
     Ok(())

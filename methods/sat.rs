@@ -11,8 +11,7 @@
 //! 3. Every radius is multiplied by the scale `s`.
 //! 4. The medial axis of the union of the grown balls, exact ([`UnionAxis`]). A ball that the union of
 //!    others covers contributes nothing.
-//! 5. Optional: sheets of small object angle are removed from the outside in (`sheets.rs`).
-//! 6. Radii are divided by `s`.
+//! 5. Radii are divided by `s`.
 //!
 //! Where grown parts touch, a tunnel closes or a loop appears. This is part of the transform: the result
 //! has the Betti numbers of the grown union.
@@ -22,45 +21,42 @@
 //! - The samples are those of the shape, shared with every other method, and not a restricted Delaunay
 //!   refinement to `delta` = 0.01 of the model's size. The union approximates the shape as well as
 //!   these samples do.
-//! - Step 5 is off by default. The authors' tool removes sheets below 30 degrees at scales above 1;
-//!   `sat_angle=30` does the same, so that the published level is that of the tool's defaults. Facets
-//!   are removed one by one, so a sheet can be removed in part.
-//! - Step 6 undoes neither part of step 2: a result at scale 1 is 0.2 % larger than the union of
+//! - The authors' tool then removes sheets with an object angle below 30 degrees at scales above 1. That
+//!   filter is not here.
+//! - Step 5 undoes neither part of step 2: a result at scale 1 is 0.2 % larger than the union of
 //!   polar balls, and its centres keep the jitter, by which results of different seeds differ. As far as
-//!   we know the authors' tool does not undo it either. Without step 2 (`radius_factor=1`, `jitter=0`)
-//!   rounding decides which polar balls meet at scale 1, and the result is torn, which a warning reports.
-//! - The authors choose the density of the samples, `delta`, and `s`; with `size=density` a number of
-//!   spheres is met by the number of samples at `s` = 1.1 (`methods/levels.rs`). Each count then
-//!   has separate balls.
-//! - By default a number of spheres is met by a search on `s`. Not every count occurs: the result is the
+//!   we know the authors' tool does not undo it either. Without step 2 rounding decides which polar balls
+//!   meet at scale 1, and the result is torn.
+//! - A number of spheres is met by a search on `s`. Not every count occurs: the result is the
 //!   largest count met that does not exceed the request; a count within 1 % ends the search. The seconds
 //!   of a request are those of all scales that it tried.
-
-mod sheets;
 
 use std::sync::Arc;
 
 use medial::complex::{AxisTally, MedialMesh, Sphere, UnionAxis, betti};
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
-    Diagnostics, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
-    Simplified, SimplifyError,
+    Diagnostics, Level, Method, MethodInfo, NativeLevel, NoParams, RunContext, Simplification,
+    Simplified,
 };
-use serde::{Deserialize, Serialize};
 
-use crate::levels::{ByKnob, level_within, perturbed, some_spheres, within};
+use crate::levels::{level_within, perturbed, some_spheres};
 use crate::{Prepared, Result};
 
 /// Scale of [`Level::Published`]: the default of the authors' tool.
 const PUBLISHED: f64 = 1.1;
 
+/// Factor of all radii before the scale, so that balls that touch in a sample overlap.
+const RADIUS_FACTOR: f64 = 1.002;
+/// Largest displacement of a centre along each axis, in radii.
+const JITTER: f64 = 1e-4;
 /// The largest scale: radii of up to a million diagonals, beyond which positions mean nothing.
 const LARGEST_SCALE: f64 = 1e6;
 
 /// The scale axis transform as a method.
 ///
 /// Has all levels. Each scale costs one regular and one Delaunay triangulation.
-pub fn method() -> Method<SatParams> {
+pub fn method() -> Method<NoParams> {
     let info = MethodInfo::new("sat", "Scale axis transform")
         .seeded()
         .citation(
@@ -77,32 +73,18 @@ pub fn method() -> Method<SatParams> {
         )
         .native(NativeLevel::larger_is_coarser("s", "scale factor"))
         .published(
-            "s = 1.1, the default of the authors' tool, without its angle filter (sat_angle=30)",
-        )
-        .params(SatParams::describe());
+            "s = 1.1, the default of the authors' tool, without its angle filter of 30 degrees",
+        );
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(shape: &'s Shape, params: SatParams, run: &RunContext) -> Prepared<'s> {
-    let params = params.validate()?;
-    if params.size == Size::Scale {
-        return Ok(Box::new(PreparedSat::new(shape, params, run)?));
-    }
-    if shape.has_given_initial() {
-        let why = "it meets a number of spheres by sampling the surface, and a given medial mesh \
-                   leaves nothing to sample: leave out --initial, or set size=scale";
-        return Err(SimplifyError::unsupported(why));
-    }
-    let run_again = run.clone();
-    Ok(Box::new(ByKnob::of_samples(shape, PUBLISHED, run, move |shape| {
-        Ok(Box::new(PreparedSat::new(shape, params, &run_again)?))
-    })?))
+fn prepare<'s>(shape: &'s Shape, _: NoParams, run: &RunContext) -> Prepared<'s> {
+    Ok(Box::new(PreparedSat::new(shape, run)?))
 }
 
 /// The balls of one shape, perturbed.
 struct PreparedSat {
     spheres: Vec<Sphere>,
-    params: SatParams,
     run: RunContext,
 }
 
@@ -117,26 +99,25 @@ struct Scaled {
     tally: AxisTally,
     /// Betti numbers of the grown union.
     union_betti: [u64; 3],
-    removed_facets: usize,
 }
 
 impl PreparedSat {
     /// Steps 1 and 2.
-    fn new(shape: &Shape, params: SatParams, run: &RunContext) -> Result<Self> {
+    fn new(shape: &Shape, run: &RunContext) -> Result<Self> {
         let balls = shape.inner_balls()?;
         run.step(0, balls.spheres.len())?;
-        let spheres = perturbed(&balls.spheres, params.radius_factor, params.jitter, run.seed);
-        Ok(Self { spheres, params, run: run.clone() })
+        let spheres = perturbed(&balls.spheres, RADIUS_FACTOR, JITTER, run.seed);
+        Ok(Self { spheres, run: run.clone() })
     }
 
-    /// Steps 3 to 6: the axis at a scale.
+    /// Steps 3 to 5: the axis at a scale.
     fn at_scale(&self, scale: f64) -> Result<Arc<Scaled>> {
         let grown = resized(&self.spheres, scale);
         let axis = UnionAxis::of_balls(&grown).map_err(ShapeError::from)?;
-        let (mut mesh, removed_facets) = sheets::filtered(&axis, self.params.sat_angle);
+        let mut mesh = axis.mesh();
         mesh.spheres = resized(&mesh.spheres, 1.0 / scale);
         let (tally, union_betti) = (*axis.tally(), axis.union_betti());
-        Ok(Arc::new(Scaled { scale, mesh, tally, union_betti, removed_facets }))
+        Ok(Arc::new(Scaled { scale, mesh, tally, union_betti }))
     }
 }
 
@@ -157,7 +138,6 @@ impl Scaled {
         diagnostics.count("balls", balls);
         diagnostics.count("balls_in_the_dual_complex", self.tally.balls);
         diagnostics.count("corners", self.tally.corners);
-        diagnostics.count("facets_removed_by_angle", self.removed_facets);
         diagnostics.count("facets_left_open", open);
         diagnostics.count("doubtful_groups", doubtful);
         let found = betti(&self.mesh);
@@ -184,43 +164,6 @@ impl Simplification for PreparedSat {
         scaled.diagnose(self.spheres.len(), &mut diagnostics);
         let (mesh, native_level) = (scaled.mesh.clone(), Some(scaled.scale));
         Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, level) })
-    }
-}
-
-// The parameters of the scale axis transform.
-
-medial::parameters! {
-    /// Parameters of the scale axis transform; the default is that of the authors' tool, without its
-    /// angle filter.
-    #[derive(Clone, Copy, Debug, PartialEq)]
-    pub struct SatParams {
-        /// Factor of all radii before the scale, so that balls that touch in a sample overlap.
-        radius_factor: f64 = 1.002, "pure number";
-        /// Largest seeded displacement of a centre along each axis.
-        jitter: f64 = 1e-4, "fraction of the radius";
-        /// Facets below it are removed from the outside in; the authors' tool has 30.
-        sat_angle: f64 = 0.0, "degrees of object angle, 0 for no filter";
-        /// Meet a number of spheres by the scale, or by the number of samples at scale 1.1.
-        size: Size = Size::Scale, "scale or density";
-    }
-}
-
-/// How a number of spheres is met.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Size {
-    /// The scale, the samples as they are.
-    Scale,
-    /// The number of samples, at the published scale.
-    Density,
-}
-
-impl SatParams {
-    fn validate(self) -> Result<Self> {
-        within("radius_factor", self.radius_factor, 0.5..=2.0)?;
-        within("jitter", self.jitter, 0.0..=0.1)?;
-        within("sat_angle", self.sat_angle, 0.0..=90.0)?;
-        Ok(self)
     }
 }
 
