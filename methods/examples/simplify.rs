@@ -35,6 +35,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     );
     // Back to the units of the file.
     let back = shape.normalisation();
-    let mesh = simplified.mesh.to_input(&back);
+    let mesh = simplified.mesh.to_input(back);
     Ok(complex::write(output, &mesh)?)
 }
