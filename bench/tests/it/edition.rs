@@ -174,7 +174,7 @@ fn stored_results_have_the_numbers_of_their_edition() {
             let path = Path::new(&folder).join(record.artifact.as_deref().unwrap_or_default());
             let axis = medial::complex::read(&path).expect("a medial mesh").mesh;
             let to_normal = shape.normalisation();
-            let axis = axis.to_normal(&to_normal);
+            let axis = axis.to_normal(to_normal);
             let evaluation = judge.evaluate(&axis).expect("an evaluation");
             let mut moved = vec![];
             compare("", &json!(record.evaluate), &json!(evaluation), &mut moved);
