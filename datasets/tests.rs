@@ -292,7 +292,7 @@ fn the_spheres_of_a_known_axis_touch_the_surface_from_inside() {
 
 fn normalised_axis(shape: &BuiltIn, normal: &Normalisation) -> Option<(MedialMesh, [usize; 3])> {
     let axis = shape.axis()?;
-    Some((axis.mesh.to_normal(&normal), axis.parts))
+    Some((axis.mesh.to_normal(normal), axis.parts))
 }
 
 fn sheet_graph(mesh: &MedialMesh) -> (SheetGraph, [usize; 3]) {

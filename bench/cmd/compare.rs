@@ -286,7 +286,10 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     }
     replace(&mut study.dataset, &arguments.dataset);
     if !is_example {
-        study.retain_groups()?;
+        let gone = study.retain_groups()?;
+        if !gone.is_empty() {
+            note(global, &format!("groups: left out {}, which this command replaces", gone.join(", ")));
+        }
     }
     // A folder: names of editions stay.
     let against = arguments.against.as_ref();

@@ -508,15 +508,18 @@ impl Study {
         names.iter().cloned().chain(noisy).collect()
     }
 
-    /// Leaves out of the groups the meshes that other ones replace.
+    /// Leaves out of the groups the meshes that other ones replace, and returns their names.
     ///
     /// # Errors
     /// As [`Study::sources`].
-    pub fn retain_groups(&mut self) -> Result<(), StudyError> {
+    pub fn retain_groups(&mut self) -> Result<Vec<String>, StudyError> {
         let known = self.mesh_names(&unique_names(&self.sources()?));
-        self.groups.values_mut().for_each(|meshes| meshes.retain(|mesh| known.contains(mesh)));
+        let mut gone = Vec::new();
+        for meshes in self.groups.values_mut() {
+            gone.extend(meshes.extract_if(.., |mesh| !known.contains(mesh)));
+        }
         self.groups.retain(|_, meshes| !meshes.is_empty());
-        Ok(())
+        Ok(gone)
     }
 
     /// Refuses groups with meshes that the study does not have.
