@@ -288,7 +288,10 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     if !is_example {
         let gone = study.retain_groups()?;
         if !gone.is_empty() {
-            note(global, &format!("groups: left out {}, which this command replaces", gone.join(", ")));
+            note(
+                global,
+                &format!("groups: left out {}, which this command replaces", gone.join(", ")),
+            );
         }
     }
     // A folder: names of editions stay.

@@ -286,7 +286,8 @@ class MedialAxis:
         is_published = isinstance(level, str) and level == "published"
         if is_published and not spheres is max_error is None:
             raise ParameterError("more than one level; give one of spheres, level and max_error")
-        axis, facts = self._axis.simplify(
+        axis, facts = _medial.simplify(
+            self._axis,
             method,
             None if spheres is None else whole(spheres, "spheres", 0, 2**32 - 1),
             None if level is None or is_published else real(level, "level"),

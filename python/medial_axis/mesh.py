@@ -245,7 +245,7 @@ class Mesh:
         from .axis import MedialAxis
 
         self._solid()
-        made = self._surface.medial_axis(str(sampling), str(dual), call(seed, threads, progress))
+        made = _medial.Axis.of_surface(self._surface, str(sampling), str(dual), call(seed, threads, progress))
         return MedialAxis._of(made, self)
 
     def read_axis(
@@ -293,7 +293,7 @@ class Mesh:
             text = json.dumps(options)
         except (TypeError, ValueError) as error:
             raise ParameterError(f"read_axis: {error}") from None
-        axis, remarks = self._surface.read_axis(path_text(path), text, call(0, threads, progress))
+        axis, remarks = _medial.Axis.read_for(self._surface, path_text(path), text, call(0, threads, progress))
         return MedialAxis._of(axis, self, remarks=remarks)
 
     def closest_points(
@@ -454,7 +454,7 @@ class Mesh:
     def __reduce__(self) -> tuple[Any, ...]:
         from .axis import MedialAxis
 
-        truth = self._surface.truth
+        truth = _medial.Axis.truth(self._surface)
         known = None if truth is None else MedialAxis._of(truth, None)
         return _restored, (*self._arrays(), self.name, self._surface.report(), known, self._problem, self.source)
 
@@ -469,7 +469,7 @@ def _restored(
     source: str | None,
 ) -> Mesh:
     """A mesh from its pickle."""
-    surface = _medial.Surface.from_parts(
+    surface = _medial.surface_from_parts(
         floats(vertices, "vertices"),
         indices(faces, "faces", 3),
         name,

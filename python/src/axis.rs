@@ -8,18 +8,14 @@ use medial::complex::{self, Contacts, Look, MedialMesh, ReadOptions, SphereValue
 use medial::geometry::Sphere;
 use medial::metrics::JudgeOptions;
 use medial::shape::{Shape, ShapeOptions};
-use medial::simplifier::Params;
-use medial::surface::{self, Loaded, Normalisation, SurfaceReport};
+use medial::surface::{self, Loaded, Normalisation, SurfaceReport, TriMesh};
+use medial_run::axis::{AxisOptions, read_axis};
 use medial_run::evaluate::Evaluator;
-use medial_run::level::Target;
 use medial_run::reconstruct::union_boundary;
-use medial_run::simplify::{Output, Request};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use serde_json::{Map, Value, json};
 
 use crate::calls::{Call, Failure, Kind, Once, long, of_points, of_rows, points, triangles};
-use crate::method::Method;
 use crate::surface::{Surface, shape_options};
 
 /// A medial mesh in input units, with its shape if that is known.
@@ -27,7 +23,8 @@ use crate::surface::{Surface, shape_options};
 pub struct Axis {
     /// In input units.
     pub mesh: Arc<MedialMesh>,
-    shape: Option<Shape>,
+    /// Its shape, if that is known.
+    pub shape: Option<Shape>,
     /// Whether it is the initial medial mesh of its shape.
     is_initial: bool,
     centres: Once,
@@ -61,7 +58,7 @@ impl Axis {
     }
 
     /// The start of a method: the shape, with this mesh as the initial one.
-    fn start(&self) -> Result<Shape, Failure> {
+    pub fn start(&self) -> Result<Shape, Failure> {
         let shape = self.shape.as_ref().ok_or_else(|| {
             Failure::input("this medial axis has no surface; read it by Mesh.read_axis, or set one by axis.of(mesh)")
         })?;
@@ -77,27 +74,6 @@ pub fn in_input_units(mesh: &MedialMesh, units: &Normalisation) -> MedialMesh {
 
 /// Contact samples and their indices, words of the shape's options, whether it is the initial medial mesh.
 type State<'py> = (Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>, Option<(String, String)>, bool);
-
-/// The level of a call: at most one of the three is given.
-fn level(
-    spheres: Option<usize>,
-    native: Option<f64>,
-    bound: Option<f64>,
-) -> Result<Target, Failure> {
-    let given = [spheres.is_some(), native.is_some(), bound.is_some()];
-    if given.iter().filter(|is_given| **is_given).count() > 1 {
-        return Err(Failure::parameter("several levels; give one of spheres, level and max_error"));
-    }
-    if let Some(bound) = bound.filter(|bound| !(*bound > 0.0 && *bound < 1.0)) {
-        let message = format!("max_error = {bound}: expected a fraction between 0 and 1");
-        return Err(Failure::parameter(message));
-    }
-    let of_count = spheres.map(Target::Spheres);
-    Ok(of_count
-        .or(native.map(Target::Native))
-        .or(bound.map(Target::MaxError))
-        .unwrap_or(Target::Published))
-}
 
 #[pymethods]
 impl Axis {
@@ -129,6 +105,51 @@ impl Axis {
         let loaded = complex::read_with(Path::new(path), options).map_err(Failure::from)?;
         let (mesh, remarks) = loaded.with_remarks();
         Ok((Self::new(mesh, None), remarks))
+    }
+
+    /// The initial Voronoi medial mesh of a surface.
+    #[staticmethod]
+    fn of_surface(
+        py: Python<'_>,
+        surface: &Surface,
+        sampling: &str,
+        dual: &str,
+        call: Call,
+    ) -> PyResult<Self> {
+        let options = shape_options(sampling, dual, call.seed)?;
+        let model = Arc::clone(&surface.model);
+        long(py, &call, move |_, monitor| {
+            monitor.at("computing the medial axis");
+            let shape = model.shape(&options)?;
+            let initial = shape.initial()?;
+            Ok(Self::initial(&initial, shape))
+        })
+    }
+
+    /// A file as a medial mesh of a surface, read and fitted by options in JSON.
+    #[staticmethod]
+    fn read_for(
+        py: Python<'_>,
+        surface: &Surface,
+        path: PathBuf,
+        options: &str,
+        call: Call,
+    ) -> PyResult<(Self, Vec<String>)> {
+        let options: AxisOptions = serde_json::from_str(options).map_err(Failure::parameter)?;
+        let model = Arc::clone(&surface.model);
+        long(py, &call, move |_, monitor| {
+            monitor.at("reading");
+            let shape = model.shape(&ShapeOptions::default())?;
+            let (loaded, _) = read_axis(&path, &shape, options).map_err(Failure::input)?;
+            let (mesh, remarks) = loaded.with_remarks();
+            Ok((Self::new(mesh, Some(shape)), remarks))
+        })
+    }
+
+    /// The exactly known medial axis of a built-in shape, for copies.
+    #[staticmethod]
+    fn truth(surface: &Surface) -> Option<Self> {
+        surface.model.truth.clone().map(|mesh| Self::new(mesh, None))
     }
 
     /// The same mesh as one of a surface.
@@ -239,48 +260,6 @@ impl Axis {
         Ok(left_out)
     }
 
-    /// A simplification by a method, at a level, and the facts of the run as JSON.
-    #[pyo3(signature = (method, spheres, native, bound, params, call))]
-    #[allow(clippy::too_many_arguments)]
-    fn simplify(
-        &self,
-        py: Python<'_>,
-        method: &Bound<'_, PyAny>,
-        spheres: Option<usize>,
-        native: Option<f64>,
-        bound: Option<f64>,
-        params: &str,
-        call: Call,
-    ) -> PyResult<(Self, String)> {
-        let method = Method::find(method)?;
-        let level = level(spheres, native, bound)?;
-        let map: Map<String, Value> = serde_json::from_str(params)
-            .map_err(|error| Failure::parameter(format!("parameters: {error}")))?;
-        let start = self.start()?;
-        let home = self.shape.clone();
-        let params = Params(map);
-        let (simplified, facts) = long(py, &call, move |context, monitor| {
-            let judge = JudgeOptions { seed: context.seed, ..JudgeOptions::default() };
-            let request = Request {
-                shape: &start,
-                method: method.get(),
-                sweep: method.sweep(),
-                params: &params,
-                context,
-                judge,
-                certify: false,
-                on_stage: &|stage| monitor.at(stage),
-            };
-            let Output { simplify, result, search } =
-                request.run(level).map_err(Failure::of_fault)?;
-            let mesh = in_input_units(&result.mesh, start.normalisation());
-            let asked = simplify.level.to_string();
-            let facts = json!({ "asked": asked, "simplify": simplify, "max_error": search });
-            Ok((mesh, facts.to_string()))
-        })?;
-        Ok((Self::new(simplified, home), facts))
-    }
-
     /// All metrics against a surface, as JSON.
     fn evaluate(
         &self,
@@ -326,4 +305,37 @@ impl Axis {
             Ok((Surface::new(name, Loaded { mesh: made, report }, None), problem))
         })
     }
+}
+
+/// A surface from the parts of another one, unchanged. Validated again if `is_solid`.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+pub fn surface_from_parts(
+    py: Python<'_>,
+    vertices: PyReadonlyArray2<'_, f64>,
+    faces: PyReadonlyArray2<'_, u32>,
+    name: String,
+    report: &str,
+    truth: Option<PyRef<'_, Axis>>,
+    is_solid: bool,
+    call: Call,
+) -> PyResult<Surface> {
+    let mesh = TriMesh {
+        vertices: points(&vertices)?.rows().to_vec(),
+        faces: triangles(&faces)?.rows().to_vec(),
+    };
+    let report: SurfaceReport = serde_json::from_str(report)
+        .map_err(|error| Failure::input(format!("report of {name}: {error}")))?;
+    let truth = truth.map(|axis| MedialMesh::clone(&axis.mesh));
+    let named = mesh.faces.iter().flatten().max();
+    if named.is_some_and(|&vertex| vertex as usize >= mesh.vertices.len()) {
+        return Err(Failure::input(format!("{name}: a face has a missing vertex")).into());
+    }
+    long(py, &call, move |_, monitor| {
+        monitor.at("checking");
+        if is_solid {
+            surface::validate(&mesh)?;
+        }
+        Ok(Surface::new(name, Loaded { mesh, report }, truth))
+    })
 }

@@ -40,7 +40,9 @@ fn _medial(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<method::ShapeHandle>()?;
     module.add_class::<method::RunHandle>()?;
     module.add_function(wrap_pyfunction!(triangulate, module)?)?;
+    module.add_function(wrap_pyfunction!(axis::surface_from_parts, module)?)?;
     module.add_function(wrap_pyfunction!(method::methods, module)?)?;
+    module.add_function(wrap_pyfunction!(method::simplify, module)?)?;
     module.add_function(wrap_pyfunction!(picture::render, module)?)?;
     module.add_function(wrap_pyfunction!(picture::results_row, module)?)?;
     module.add_function(wrap_pyfunction!(run_command, module)?)?;

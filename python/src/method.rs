@@ -8,6 +8,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use medial::complex::MedialMesh;
+use medial::metrics::JudgeOptions;
 use medial::shape::Shape;
 use medial::simplifier::{
     Level, MedialSimplifier, MethodInfo, NativeLevel, ParamInfo, Params, Presentation, Registered,
@@ -17,13 +18,16 @@ use medial::surface::Side;
 use medial_bench::plugin::ScriptLoader;
 use medial_bench::study::no_such_method;
 use medial_bench::study::registry::{Entry, Registry};
+use medial_run::level::Target;
+use medial_run::simplify::{self, Request};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError};
 use pyo3::prelude::*;
 use serde::Deserialize;
+use serde_json::{Map, Value, json};
 
-use crate::axis::Axis;
-use crate::calls::{Failure, Kind, of_points, of_rows, points};
+use crate::axis::{Axis, in_input_units};
+use crate::calls::{Call, Failure, Kind, long, of_points, of_rows, points};
 
 /// The Python module that calls the classes.
 const BETWEEN: &str = "medial_axis._plugins";
@@ -79,6 +83,69 @@ impl Method {
             Self::Class(method) => &method.presentation.sweep,
         }
     }
+}
+
+/// The level of a call: at most one of the three is given.
+fn level(
+    spheres: Option<usize>,
+    native: Option<f64>,
+    bound: Option<f64>,
+) -> Result<Target, Failure> {
+    let given = [spheres.is_some(), native.is_some(), bound.is_some()];
+    if given.iter().filter(|is_given| **is_given).count() > 1 {
+        return Err(Failure::parameter("several levels; give one of spheres, level and max_error"));
+    }
+    if let Some(bound) = bound.filter(|bound| !(*bound > 0.0 && *bound < 1.0)) {
+        let message = format!("max_error = {bound}: expected a fraction between 0 and 1");
+        return Err(Failure::parameter(message));
+    }
+    let of_count = spheres.map(Target::Spheres);
+    Ok(of_count
+        .or(native.map(Target::Native))
+        .or(bound.map(Target::MaxError))
+        .unwrap_or(Target::Published))
+}
+
+/// A simplification of a medial mesh by a method, at a level, and the facts of the run as JSON.
+#[pyfunction]
+#[pyo3(signature = (axis, method, spheres, native, bound, params, call))]
+#[allow(clippy::too_many_arguments)]
+pub fn simplify(
+    py: Python<'_>,
+    axis: &Axis,
+    method: &Bound<'_, PyAny>,
+    spheres: Option<usize>,
+    native: Option<f64>,
+    bound: Option<f64>,
+    params: &str,
+    call: Call,
+) -> PyResult<(Axis, String)> {
+    let method = Method::find(method)?;
+    let level = level(spheres, native, bound)?;
+    let map: Map<String, Value> = serde_json::from_str(params)
+        .map_err(|error| Failure::parameter(format!("parameters: {error}")))?;
+    let start = axis.start()?;
+    let home = axis.shape.clone();
+    let params = Params(map);
+    let (simplified, facts) = long(py, &call, move |context, monitor| {
+        let judge = JudgeOptions { seed: context.seed, ..JudgeOptions::default() };
+        let request = Request {
+            shape: &start,
+            method: method.get(),
+            sweep: method.sweep(),
+            params: &params,
+            context,
+            judge,
+            certify: false,
+            on_stage: &|stage| monitor.at(stage),
+        };
+        let simplify::Output { simplify, result, search } = request.run(level).map_err(Failure::of_fault)?;
+        let mesh = in_input_units(&result.mesh, start.normalisation());
+        let asked = simplify.level.to_string();
+        let facts = json!({ "asked": asked, "simplify": simplify, "max_error": search });
+        Ok((mesh, facts.to_string()))
+    })?;
+    Ok((Axis::new(simplified, home), facts))
 }
 
 /// A Python class as a method.

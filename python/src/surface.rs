@@ -10,12 +10,10 @@ use medial::surface::{
     self, Components, Format, InsideTest, Loaded, MendOptions, Normalisation, Sampling,
     SignedDistance, SurfaceReport, TriMesh, TriangleBvh,
 };
-use medial_run::axis::{AxisOptions, read_axis};
 use medial_run::input::{Input, Source};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::axis::Axis;
 use crate::calls::{Call, Failure, Kind, Once, long, of_points, of_rows, points, triangles};
 
 /// A surface that bounds a solid, in its own units.
@@ -29,12 +27,12 @@ pub struct Surface {
 
 /// The surface and its substrates.
 pub struct Model {
-    name: String,
+    pub name: String,
     /// In its own units.
     pub mesh: TriMesh,
     report: SurfaceReport,
     /// The exactly known medial axis of a built-in shape.
-    truth: Option<MedialMesh>,
+    pub truth: Option<MedialMesh>,
     tree: OnceLock<TriangleBvh>,
     inside: OnceLock<InsideTest>,
     /// Shapes by their options.
@@ -159,45 +157,6 @@ impl Surface {
         Normalisation::of(&self.model.mesh).map_or(0.0, |units| units.diagonal)
     }
 
-    /// The exactly known medial axis of a built-in shape, for copies.
-    #[getter]
-    fn truth(&self) -> Option<Axis> {
-        self.model.truth.clone().map(|mesh| Axis::new(mesh, None))
-    }
-
-    /// A surface from the parts of another one, unchanged. Validated again if `is_solid`.
-    #[staticmethod]
-    #[allow(clippy::too_many_arguments)]
-    fn from_parts(
-        py: Python<'_>,
-        vertices: PyReadonlyArray2<'_, f64>,
-        faces: PyReadonlyArray2<'_, u32>,
-        name: String,
-        report: &str,
-        truth: Option<PyRef<'_, Axis>>,
-        is_solid: bool,
-        call: Call,
-    ) -> PyResult<Self> {
-        let mesh = TriMesh {
-            vertices: points(&vertices)?.rows().to_vec(),
-            faces: triangles(&faces)?.rows().to_vec(),
-        };
-        let report: SurfaceReport = serde_json::from_str(report)
-            .map_err(|error| Failure::input(format!("report of {name}: {error}")))?;
-        let truth = truth.map(|axis| MedialMesh::clone(&axis.mesh));
-        let named = mesh.faces.iter().flatten().max();
-        if named.is_some_and(|&vertex| vertex as usize >= mesh.vertices.len()) {
-            return Err(Failure::input(format!("{name}: a face has a missing vertex")).into());
-        }
-        long(py, &call, move |_, monitor| {
-            monitor.at("checking");
-            if is_solid {
-                surface::validate(&mesh)?;
-            }
-            Ok(Self::new(name, Loaded { mesh, report }, truth))
-        })
-    }
-
     /// A surface that bounds a solid, from a file or from the text of an OFF file, after optional repairs.
     #[staticmethod]
     #[allow(clippy::too_many_arguments)]
@@ -232,43 +191,6 @@ impl Surface {
 
     fn save(&self, path: PathBuf) -> PyResult<()> {
         Ok(surface::write(path, &self.model.mesh).map_err(Failure::from)?)
-    }
-
-    /// The initial Voronoi medial mesh.
-    fn medial_axis(
-        &self,
-        py: Python<'_>,
-        sampling: &str,
-        dual: &str,
-        call: Call,
-    ) -> PyResult<Axis> {
-        let options = shape_options(sampling, dual, call.seed)?;
-        let model = Arc::clone(&self.model);
-        long(py, &call, move |_, monitor| {
-            monitor.at("computing the medial axis");
-            let shape = model.shape(&options)?;
-            let initial = shape.initial()?;
-            Ok(Axis::initial(&initial, shape))
-        })
-    }
-
-    /// A file as a medial mesh of this surface, read and fitted by options in JSON.
-    fn read_axis(
-        &self,
-        py: Python<'_>,
-        path: PathBuf,
-        options: &str,
-        call: Call,
-    ) -> PyResult<(Axis, Vec<String>)> {
-        let options: AxisOptions = serde_json::from_str(options).map_err(Failure::parameter)?;
-        let model = Arc::clone(&self.model);
-        long(py, &call, move |_, monitor| {
-            monitor.at("reading");
-            let shape = model.shape(&ShapeOptions::default())?;
-            let (loaded, _) = read_axis(&path, &shape, options).map_err(Failure::input)?;
-            let (mesh, remarks) = loaded.with_remarks();
-            Ok((Axis::new(mesh, Some(shape)), remarks))
-        })
     }
 
     /// For each point the closest one of the surface, its distance and its face.

@@ -131,7 +131,8 @@ mod tests {
         assert!(swept.hausdorff() >= peaks.hausdorff());
         // The corners above are farthest, and the ball protrudes by a tenth below.
         let corner = Vec3::new(0.5, 0.5, 0.6).length() - 0.5;
-        assert!((peaks.forward[0].distance - corner).abs() < 1e-12, "{:?}", peaks.forward[0]);
+        // Radii grow by 1e-9 of the diameter.
+        assert!((peaks.forward[0].distance - corner).abs() < 2e-9, "{:?}", peaks.forward[0]);
         assert_eq!(peaks.forward[0].point.z, 1.0);
         let measured = distances(&surface, &tree, &mesh, &options).unwrap();
         assert!((peaks.hausdorff() - measured.hausdorff).abs() < 1e-9);
@@ -141,7 +142,7 @@ mod tests {
             assert!(descends(&found.forward) && descends(&found.reverse));
         }
         for peak in &peaks.reverse {
-            assert!(ball.signed_distance(peak.point).abs() < 1e-9);
+            assert!(ball.signed_distance(peak.point).abs() < 4e-9);
         }
     }
 }

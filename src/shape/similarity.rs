@@ -12,6 +12,7 @@
 //! medial mesh. [`Fit::uncertainty`] estimates these.
 
 use std::fmt;
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{BVec3, DMat4, DVec4};
@@ -144,6 +145,12 @@ const DOUBTFUL: f64 = 0.01;
 /// Largest median misfit of needed units that are exact: without a free parameter, they fit no other surface by chance.
 const FITTING: f64 = 0.05;
 
+/// Scale from which a fit is needed up to [`FITTING`] although it has free parameters.
+const FAR: f64 = 2.0;
+
+/// Ratio of the boxes of surface and fitted union at which they match.
+const BOX: Range<f64> = 0.8..1.25;
+
 /// Limit of spheres for a fit, evenly taken from their list.
 const SPHERES: usize = 4000;
 
@@ -160,9 +167,9 @@ const NEARER: f64 = 2.0;
 /// Limit of steps of the optimisation. Where there is an optimum, far fewer suffice.
 const STEPS: usize = 60;
 
-/// Largest ratio of the mean distance of a preferred convention to that of the optimum, whose four parameters follow the
-/// errors of the medial mesh.
-const PREFERENCE: f64 = 2.0;
+/// Largest ratios of the mean distance of a preferred similarity to that of the best scale, and to that of the best scale
+/// and shift, whose four parameters follow the errors of the medial mesh.
+const PREFERENCE: [f64; 2] = [1.5, 3.0];
 
 /// Mean distance of the surface to the union at which any convention is preferred, as a fraction of the diagonal.
 const CLOSE: f64 = 1e-3;
@@ -214,23 +221,30 @@ impl Shape {
         let scaled = optimum(least(&mut plain.into_iter()), FitSource::Scaled);
         let fitted = optimum(least(&mut all.chain([scaled.2])), FitSource::Fitted);
         // The fewest free parameters that leave the union nearly as near as the optimum.
-        let enough = f64::max(PREFERENCE * fitted.0, CLOSE);
+        let with_shift = PREFERENCE[1] * fitted.0;
+        let enough = |has_no_shift: bool| {
+            let without = if has_no_shift { PREFERENCE[0] * scaled.0 } else { f64::INFINITY };
+            with_shift.min(without).max(CLOSE)
+        };
         let best = exact.into_iter().map(|(source, s)| (nearness.of(&s), source, s));
-        let best = best.filter(|(near, ..)| *near <= enough);
+        let best = best.filter(|(near, source, _)| *near <= enough(source.has_no_shift()));
         let best = best.min_by(|a, b| a.0.total_cmp(&b.0));
         let ((after, by_radii, normal), source) = match best {
             Some((near, source, s)) => ((near, s, s), source),
-            None if scaled.0 <= enough => (scaled, FitSource::Scaled),
+            None if scaled.0 <= enough(false) => (scaled, FitSource::Scaled),
             None => (fitted, FitSource::Fitted),
         };
         let [before, misfit] = [&Similarity::IDENTITY, &normal]
             .map(|s| median(&surface.residuals(&spheres, s)).unwrap_or(0.0));
         let is_free = matches!(source, FitSource::Scaled | FitSource::Fitted);
-        let is_needed = misfit <= if is_free { DOUBTFUL } else { FITTING }
+        let is_far = !(1.0 / FAR..FAR).contains(&normal.scale);
+        let is_needed = misfit <= if is_free && !is_far { DOUBTFUL } else { FITTING }
             && after.is_finite()
             && NEARER * after <= nearness.of(&Similarity::IDENTITY)
-            // Of a few spheres a larger scale brings any union nearer to the surface.
-            && NEARER * mean(&normal) <= mean(&Similarity::IDENTITY);
+            // A larger scale brings the union of a few spheres nearer to the surface. A mesh in a corner of the
+            // surface fits at any size.
+            && (NEARER * mean(&normal) <= mean(&Similarity::IDENTITY)
+                || is_far && BOX.contains(&(boxes.scale / normal.scale)));
         Ok(Fit {
             similarity: surface.in_input_units(&normal),
             source,
@@ -241,16 +255,16 @@ impl Shape {
         })
     }
 
-    /// The similarity of [`Shape::fit`] where [`Fit::is_needed`], for a mesh that does not fit as it is, to 1 % of the
-    /// smaller of its own extent and the diagonal.
+    /// The similarity of [`Shape::fit`] where [`Fit::is_needed`], for a mesh that does not fit to 1 % as it is, or whose
+    /// box is far from that of the surface.
     ///
     /// # Errors
     /// When the surface has no face.
     pub fn fit_if_needed(&self, mesh: &MedialMesh) -> Result<Option<Fit>, ShapeError> {
-        // A mesh that is far too small has small radii, and may lie at a corner of the surface.
+        // A mesh that is far too small fits at a corner of the surface.
         let surface = Surface::of(self)?;
-        let extent = 1.0 / surface.by_boxes(&surface.spheres(mesh)).scale;
-        if self.misfit(mesh)?.is_some_and(|misfit| misfit <= DOUBTFUL * extent.min(1.0)) {
+        let is_far = !(1.0 / FAR..FAR).contains(&surface.by_boxes(&surface.spheres(mesh)).scale);
+        if !is_far && self.misfit(mesh)?.is_some_and(|misfit| misfit <= DOUBTFUL) {
             return Ok(None);
         }
         Ok(Some(self.fit(mesh)?).filter(|fit| fit.is_needed))
@@ -658,7 +672,9 @@ mod tests {
     fn a_mesh_that_is_far_too_small_has_other_units() {
         let mesh = cuboid(Vec3::ZERO, Vec3::new(3.0, 2.0, 1.0));
         let report = validate(&mesh).unwrap();
-        let shape = Shape::new("corner", &mesh, report, ShapeOptions::default()).unwrap();
+        let sampling = "uniform:4000".parse().unwrap();
+        let options = ShapeOptions { sampling, ..ShapeOptions::default() };
+        let shape = Shape::new("corner", &mesh, report, options).unwrap();
         let normal = *shape.normalisation();
         let axis = shape.initial().unwrap().to_input(&normal);
         for scale in [1000.0, 25.4] {

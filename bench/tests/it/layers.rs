@@ -185,7 +185,6 @@ const CIRCLES: &[&[&str]] = &[
         "methods/tight/start.rs",
     ],
     &["methods/vmas/refit.rs", "methods/vmas/sampling.rs"],
-    &["python/src/axis.rs", "python/src/method.rs", "python/src/surface.rs"],
 ];
 
 #[test]
