@@ -107,10 +107,21 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         max_error: arguments.max_error,
         tolerance: arguments.tolerance,
     };
-    let failed = |error: DrawError| match &error {
-        DrawError::Reconstruction { .. } if error.is_option() => Failure::usage(error),
-        _ if error.is_option() => Failure::usage(format!("--{error}")),
-        _ => Failure::input(error),
+    let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let failed = |error: DrawError| {
+        let code = if error.is_option() { Exit::Usage } else { Exit::Input };
+        // The file instead of the caption.
+        let file = |name: &str| arguments.axes.iter().find(|path| stem(path) == *name);
+        let message = match &error {
+            DrawError::Reconstruction { name, error } => {
+                file(name).map(|path| Failure::at(path, error))
+            }
+            DrawError::Metric { name, error } => file(name).map(|path| Failure::at(path, error)),
+            _ if error.is_option() => Some(Failure::usage(format!("--{error}"))),
+            _ => None,
+        };
+        let message = message.map_or_else(|| error.to_string(), |failure| failure.message);
+        Failure { code, message }
     };
     drawing.content(arguments.axes.len()).map_err(failed)?;
     let line = StageLine::new(global.stages());
@@ -122,8 +133,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     for path in &arguments.axes {
         let (mesh, notes) = read_axis(path, &shape, arguments.fitting.into())?.0.with_remarks();
         warnings.extend(notes);
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        axes.push((name, mesh.to_normal(units)));
+        axes.push((stem(path), mesh.to_normal(units)));
     }
     let drawn = drawing.draw(&shape, &axes, &|stage| line.at(stage)).map_err(failed)?;
     let Drawn { png, width, height, direction, up, errors, seconds } = drawn;

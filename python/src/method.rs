@@ -139,7 +139,8 @@ pub fn simplify(
             certify: false,
             on_stage: &|stage| monitor.at(stage),
         };
-        let simplify::Output { simplify, result, search } = request.run(level).map_err(Failure::of_fault)?;
+        let simplify::Output { simplify, result, search } =
+            request.run(level).map_err(Failure::of_fault)?;
         let mesh = in_input_units(&result.mesh, start.normalisation());
         let asked = simplify.level.to_string();
         let facts = json!({ "asked": asked, "simplify": simplify, "max_error": search });

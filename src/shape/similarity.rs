@@ -151,6 +151,9 @@ const FAR: f64 = 2.0;
 /// Ratio of the boxes of surface and fitted union at which they match.
 const BOX: Range<f64> = 0.8..1.25;
 
+/// Median misfit up to which radii are exact.
+const PRECISE: f64 = 1e-3;
+
 /// Limit of spheres for a fit, evenly taken from their list.
 const SPHERES: usize = 4000;
 
@@ -212,10 +215,14 @@ impl Shape {
             starts.min_by(|a, b| a.0.total_cmp(&b.0)).expect("the first one").1
         };
         let nearness = surface.nearness(mesh);
-        // Radii of a simplified mesh are biased, its union is not: the optimum of the radii is only a start.
+        // Radii of many simplified meshes are biased, their union is not: the optimum of the radii is a start then.
         let optimum = |start, source| {
             let by_radii = surface.optimised(&spheres, start, source);
-            let by_union = surface.nearest(&nearness, by_radii, source);
+            let misfit = median(&surface.residuals(&spheres, &by_radii)).unwrap_or(0.0);
+            let by_union = match misfit <= PRECISE {
+                true => by_radii,
+                false => surface.nearest(&nearness, by_radii, source),
+            };
             (nearness.of(&by_union), by_radii, by_union)
         };
         let scaled = optimum(least(&mut plain.into_iter()), FitSource::Scaled);

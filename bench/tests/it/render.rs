@@ -82,7 +82,7 @@ fn wrong_words_are_named_and_nothing_is_written() {
         (
             &[&axis, "--show", "error", "--tolerance", "1e-7"],
             2,
-            "ball: tolerance 1.000e-7 is too fine",
+            "ball.ma: tolerance 1.000e-7 is too fine",
         ),
         (&["no-such.ma"], 1, "no-such.ma"),
         (&[&points, "--show", "error"], 1, "points.ma: all spheres have radius zero"),
