@@ -683,7 +683,8 @@ mod tests {
             }
         }
         // The voxels fit, their medial mesh does not.
-        let solid = solid(60, 4.0);
+        let setting = LatticeSetting { max_megabytes: 4.0, ..LatticeSetting::own(60) };
+        let solid = Solid::new(&shape, setting, RunContext::default()).expect("faces");
         let base = solid.base().expect("fits");
         let axis = solid.axis(&base.descent, 20.0).expect("not cancelled");
         let needed = solid.megabytes_with_output(&base, &axis);
