@@ -158,7 +158,7 @@ fn rank_facets(shape: &Shape, run: &RunContext) -> Result<RankedFacets<'static>>
     Ok(RankedFacets::new(set, values, scale(), Diagnostics::default()))
 }
 
-/// A point closer than this, in chords, to the middle of two samples counts as the middle.
+/// Distance from the middle of two samples up to which a point counts as the middle, in chords.
 const MIDDLE: f64 = 1e-9;
 
 /// Degrees between two points that are equally far from `x`. The arc tangent keeps its digits where

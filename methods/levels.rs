@@ -25,20 +25,19 @@ use rand_pcg::Pcg64;
 
 use crate::{Prepared, Result};
 
-/// A count within this fraction below the requested one ends the search; comparisons at equal counts
-/// accept such a count.
+/// Shortfall of a count that ends the search, as a fraction. Comparisons at equal counts accept it.
 const TOLERANCE: f64 = 0.02;
 
-/// Values that are tried at most.
+/// Limit of the values that are tried.
 const MAX_PROBES: usize = 12;
 
-/// Most samples that a search takes: memory and time stay bounded, for every request.
+/// Limit of the samples of a search. Bounds memory and time.
 const MAX_SAMPLES: f64 = 50_000.0;
 
 /// Longest step of step 2, as a factor.
 const MAX_STEP: f64 = 16.0;
 
-/// Two values nearer to each other, as a fraction, have met.
+/// Relative difference below which two values have met.
 const MET: f64 = 2e-3;
 
 /// Distance of the first values of step 4, as a fraction.

@@ -50,7 +50,7 @@ const PUBLISHED: f64 = 1.1;
 const RADIUS_FACTOR: f64 = 1.002;
 /// Largest displacement of a centre along each axis, in radii.
 const JITTER: f64 = 1e-4;
-/// The largest scale: radii of up to a million diagonals, beyond which positions mean nothing.
+/// Largest scale: radii of up to a million diagonals.
 const LARGEST_SCALE: f64 = 1e6;
 
 /// The scale axis transform as a method.
@@ -177,22 +177,22 @@ impl Simplification for PreparedSat {
 //
 // No scale is tried twice.
 
-/// The first step above scale 1; each further one is twice as long.
+/// First step above scale 1. Each further one is twice as long.
 const FIRST_STEP: f64 = 0.1;
 
-/// Steps until the search gives up: scale 3,277.
+/// Limit of the steps, up to scale 3,277.
 const MAX_STEPS: usize = 16;
 
-/// Steps before the test for a stall, up to scale 7.4: there the count can rise for long and fall later.
+/// Steps before the test for a stall, up to scale 7.4. There the count can rise for long and fall later.
 const STEPS_BEFORE_STALL: usize = 7;
 
-/// The count has stalled if as many steps brought it down by less than this fraction.
+/// Steps of the test for a stall, and the fall of the count below which it has stalled, as a fraction.
 const STALL: (usize, f64) = (3, 0.03);
 
-/// Scales that are tried between two of these steps.
+/// Limit of the scales that are tried between two of these steps.
 const MAX_TRIES: usize = 8;
 
-/// A count within this fraction below the requested one ends the search.
+/// Shortfall of a count that ends the search, as a fraction.
 const TOLERANCE: f64 = 0.01;
 
 /// The scale axis with the largest count that the search meets of those not above `count`; with a

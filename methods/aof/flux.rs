@@ -105,17 +105,17 @@ impl Sphere {
 
 /// Sine of the dihedral deviation below which two faces are coplanar.
 const COPLANAR: f64 = 1e-7;
-/// A sample of the flux is one-sided only if the surface is nearer to its opposite by this fraction.
+/// Relative distance by which the surface has to be nearer to the opposite of a one-sided sample.
 const SAME: f64 = 1e-10;
 /// Bound on the rounding error of a flux, also as a number in single precision.
 const ROUNDING: f64 = 1e-6;
 /// Triangles near a sphere up to which a list of them is faster for its samples than the tree.
 pub(super) const FEW: usize = 192;
-/// As [`FEW`], where the list also serves the voxels inside, for spheres of at most [`SMALL`].
+/// As [`FEW`], for a list that also serves the voxels inside, of spheres of at most [`SMALL`].
 pub(super) const MANY: usize = 768;
-/// Radius from which on a sphere has mostly more than [`MANY`] triangles near it.
+/// Radius above which a sphere mostly has more than [`MANY`] triangles near it, a fraction of the diagonal.
 pub(super) const SMALL: f64 = 0.025;
-/// Cosine of the angle to the gradient up to which samples are measured first.
+/// Cosine of the angle to the gradient above which samples are measured first.
 const STEEP: f64 = 0.6;
 
 /// A closed, outward-oriented surface, seen from inside.
@@ -299,13 +299,13 @@ fn fans(mesh: &TriMesh) -> Vec<u8> {
     fans
 }
 
-/// Samples that are followed onto the axis.
+/// Limit of the samples that are followed onto the axis.
 const FOLLOWED_SAMPLES: usize = 4;
 /// Width of the last interval, in radii of the voxel's sphere.
 const TOLERANCE: f64 = 1e-9;
-/// A point of a ray has another closest point only if that is nearer by this fraction.
+/// Relative distance by which another closest point of a ray has to be nearer.
 const SAME_ON_RAY: f64 = 1e-12;
-/// Every fourth cut halves the interval.
+/// Cuts of an interval for each one that halves it.
 const HALVING: u32 = 4;
 /// Voxels between two reports of progress.
 const TASK: usize = 256;

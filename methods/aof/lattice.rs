@@ -113,6 +113,7 @@ pub(super) fn betti(voxels: impl Iterator<Item = Voxel>) -> [u64; 3] {
 
 /// Voxels along a side of a brick.
 const SIDE: u32 = 8;
+/// Entry of a brick that is not allocated.
 const ABSENT: u32 = u32::MAX;
 
 /// Indices of a voxel along the three axes, from the lower corner of the bounding box.
@@ -317,7 +318,7 @@ fn inside([x, y, z]: Place) -> (usize, usize) {
     (usize::from(z % 8), usize::from(x % 8 + 8 * (y % 8)))
 }
 
-/// Coarse voxels along a side of a block, at most.
+/// Largest number of coarse voxels along a side of a block.
 const BLOCK: u32 = 4;
 /// Blocks along the longest side of a small lattice, so that there is work for several threads.
 const BLOCKS: u32 = 4;

@@ -316,8 +316,8 @@ mod tests {
 
     #[test]
     fn only_the_lattice_of_the_requested_level_is_made() {
-        let shape = crate::test_shape("plate", 8);
-        let params = AofParams { resolution: Resolution::Voxels(40) };
+        let shape = crate::test_shape("box", 8);
+        let params = AofParams { resolution: Resolution::Voxels(99) };
         let mut prepared = PreparedAof::new(&shape, params, &RunContext::default()).expect("valid");
         prepared.at(Level::Published).expect("published");
         assert!(prepared.own.is_none());

@@ -103,9 +103,9 @@ static TOUCHING_AFTER: LazyLock<[u32; 27]> = LazyLock::new(|| {
     })
 });
 
-/// The block of 2 x 2 x 2 voxels at the lowest corner of a neighbourhood, and how far its bits move
-/// to the other corners.
+/// Bits of the 2 x 2 x 2 voxels at the lowest corner of a neighbourhood.
 const BLOCK: u32 = 0o033_033;
+/// Shifts of these bits to all corners.
 const CORNERS: [u32; 8] = [0, 1, 3, 4, 9, 10, 12, 13];
 
 /// Step 1: each tetrahedron as its four triangles. `faces` ascend; `first` has for each voxel the first

@@ -112,7 +112,7 @@ impl<'s> Solid<'s> {
 // the least difference of Betti numbers, then the least loss (below), then the finest. A
 // warning names the difference or the loss.
 
-/// How often the lattice is made finer, half as fine again each time.
+/// Limit of the refinements of the lattice, by half each.
 const REFINEMENTS: u32 = 3;
 
 /// The lattice to work at.
@@ -253,9 +253,9 @@ impl Solid<'_> {
 // where it is farther than [`LOST`] voxels: along sharp edges spheres stay one to three voxels away
 // without anything being lost.
 
-/// Distance from all spheres, in voxels, from which on a point of the surface is lost.
+/// Distance from all spheres above which a point of the surface is lost, in voxels.
 const LOST: f64 = 3.0;
-/// Points of the surface that are measured, at most.
+/// Limit of the measured points of the surface.
 const MAX_POINTS: usize = 60_000;
 
 /// A part of the surface that is far from every voxel's sphere.
@@ -340,7 +340,7 @@ impl Solid<'_> {
 /// Bytes for each voxel of the start set: values in bricks that are not full, twice while one is
 /// thinned, lists of blocks, the heap.
 pub(super) const BYTES_PER_VOXEL: f64 = 64.0;
-/// Voxels that a lattice tried for a count may visit.
+/// Limit of the voxels that a lattice for a count may visit.
 const MAX_VISITS: f64 = 2e7;
 
 impl Solid<'_> {
@@ -390,9 +390,9 @@ impl Solid<'_> {
 // A resolution set by the user is not changed. Otherwise it is lowered until the voxels and the medial
 // mesh fit into memory. A solid without a coarse voxel starts with fine ones.
 
-/// How often the resolution is lowered for the medial mesh.
+/// Limit of the times that the resolution is lowered for the medial mesh.
 const MAX_LOWERINGS: usize = 4;
-/// The memory that a lower resolution aims at, as a share of the limit.
+/// Memory that a lower resolution aims at, as a share of the limit.
 const AIMED_MEMORY: f64 = 0.95;
 
 /// The solid at the published level.
@@ -461,15 +461,15 @@ impl Solid<'_> {
 //
 // No lattice is tried twice.
 
-/// A lattice with at most this share of voxels above the count is not made coarser.
+/// Size of a lattice up to which none coarser is tried, in requested counts.
 const ENOUGH: f64 = 1.15;
-/// A lattice may lose so much more of the surface than the base does or may.
+/// Limit of the loss of a lattice, in losses of the base.
 const WORSE: f64 = 1.2;
-/// The size that the estimate aims at, in requested counts.
+/// Size that the estimate aims at, in requested counts.
 const AIM: f64 = 1.06;
-/// Lattices that are tried for a count.
+/// Limit of the lattices that are tried for a count.
 const MAX_TRIES: usize = 8;
-/// Neighbours from which on a voxel of a thinned axis is taken to be on a sheet.
+/// Number of neighbours, itself included, up to which a voxel of a thinned axis is on a curve.
 const ON_A_SHEET: u32 = 4;
 
 impl Solid<'_> {
@@ -683,7 +683,8 @@ mod tests {
             }
         }
         // The voxels fit, their medial mesh does not.
-        let solid = solid(60, 4.0);
+        let setting = LatticeSetting { max_megabytes: 4.0, ..LatticeSetting::own(60) };
+        let solid = Solid::new(&shape, setting, RunContext::default()).expect("faces");
         let base = solid.base().expect("fits");
         let axis = solid.axis(&base.descent, 20.0).expect("not cancelled");
         let needed = solid.megabytes_with_output(&base, &axis);

@@ -125,13 +125,15 @@ const PLANES: [u32; 9] = [
 
 /// Bit of the voxel itself.
 pub(super) const CENTRE: u32 = 13;
-/// Layers of a neighbourhood without its lowest and its highest column, row and layer.
+/// Bits of a neighbourhood without its lowest column, row and layer.
 const NOT_LOW: [u32; 3] = [0o666_666_666, 0o770_770_770, 0o777_777_000];
+/// Bits of a neighbourhood without its highest column, row and layer.
 const NOT_HIGH: [u32; 3] = [0o333_333_333, 0o077_077_077, 0o000_777_777];
-/// How far a step along each axis moves a bit.
+/// Shift of a bit by a step along each axis.
 const STEP: [u32; 3] = [1, 3, 9];
-/// The 18 nearest neighbours, and of them the six that share a face.
+/// Bits of the 18 nearest neighbours.
 const NEAREST_18: u32 = 0o272_757_272;
+/// Bits of the six neighbours that share a face.
 pub(super) const FACES: u32 = 1 << 4 | 1 << 10 | 1 << 12 | 1 << 14 | 1 << 16 | 1 << 22;
 
 /// Whether a voxel with this neighbourhood is simple, in some 100 operations.

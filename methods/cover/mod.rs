@@ -67,17 +67,18 @@ use crate::{Prepared, Result};
 /// Spheres of [`Level::Published`].
 const USUAL: usize = 64;
 
-/// Most spheres that are placed together.
+/// Limit of the spheres that are placed together.
 const MOST: usize = 1_000;
 
 /// The powers of the rounds, as exponents of 2, and of their swaps.
 const POWERS: [(u32, u32); 4] = [(3, 3), (4, 4), (5, 5), (5, 5)];
 
-/// The last round is repeated this many times over the number of spheres, within a limit: few spheres are cheap.
+/// Product of the number of spheres and the repetitions of the last round: few spheres are cheap.
 const REPEATED: usize = 96;
+/// Limit of these repetitions.
 const MOST_REPEATED: usize = 4;
 
-/// Times that a round selects points, and sweeps on each selection.
+/// Selections of points in a round, and sweeps on each.
 const SWEEPS: [usize; 2] = [3, 3];
 
 /// Width of a round's certified interval of `G`, as a share of it.
@@ -89,17 +90,20 @@ const WIDTH: f64 = 0.005;
 /// Width of the certified interval that proves cover.
 const PROOF_WIDTH: f64 = 1e-3;
 
-/// Narrower intervals than this, in diagonals, are not worth their cost, and the first one has the other width.
+/// Narrowest certified interval, in diagonals.
 const LEAST_WIDTH: f64 = 1e-5;
+/// Width of the first certified interval, in diagonals.
 const ROUGH_FIRST: f64 = 0.01;
 
-/// Radii are smaller than the depth by this, in diagonals, so that files keep them inside.
+/// Margin of radii below the depth, in diagonals, so that files keep spheres inside.
 const WITHIN: f64 = 1e-7;
 
-/// Radii are larger by this share of the error, and at least by this, in diagonals: a certificate of cover needs a
-/// margin, and takes the time of its inverse. Where it fails, the margin is multiplied by the third.
+/// Margin of radii for a certificate of cover, as a share of the error. The certificate takes the time of its
+/// inverse.
 const BEYOND_SHARE: f64 = 0.005;
+/// Smallest such margin, in diagonals.
 const BEYOND: f64 = 1e-5;
+/// Factor of the margin where the certificate fails.
 const BEYOND_FACTOR: f64 = 4.0;
 
 /// Spheres that cover, as a method.
@@ -356,13 +360,14 @@ impl PreparedCover<'_> {
     }
 }
 
-/// The share of the greedy choice's spheres that the search for an error begins with, and the power of the error by
-/// which it changes their number.
+/// Share of the greedy choice's spheres that the search for an error begins with.
 const LEFT: f64 = 0.7;
+/// Exponent of the error, by which that search changes the number of spheres.
 const MORE: f64 = 1.3;
 
-/// Counts that the search for an error tries, and the part of a count that it does not resolve.
+/// Limit of the counts that the search for an error tries.
 const TRIALS: usize = 6;
+/// Inverse of the part of a count that it does not resolve.
 const CLOSE: usize = 24;
 
 fn grown(balls: &[Sphere], by: f64) -> Vec<Sphere> {

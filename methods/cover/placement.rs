@@ -19,15 +19,17 @@ use rayon::prelude::*;
 
 use crate::Result;
 
-/// Balls of the greedy start for each sphere, and their least and largest number.
+/// Balls of the greedy start for each sphere.
 const CANDIDATES_EACH: usize = 30;
+/// Smallest and largest number of these balls.
 const CANDIDATES: [usize; 2] = [2_000, 6_000];
 
-/// Surface points for each sphere, besides the vertices, and their least and largest number.
+/// Surface points for each sphere, besides the vertices.
 const POINTS_EACH: usize = 400;
+/// Smallest and largest number of these points.
 const POINTS: [usize; 2] = [20_000, 60_000];
 
-/// Points that the greedy start covers at most.
+/// Limit of the points that the greedy start covers.
 const GREEDY_POINTS: usize = 4_000;
 
 /// Halvings of the interval of the greedy start's threshold.
@@ -36,32 +38,34 @@ const HALVINGS: usize = 9;
 /// Trial steps of each sphere in a sweep.
 const TRIALS: usize = 6;
 
-/// A step that improves is followed by one this many times as long, one that does not by the other.
+/// Factors of the step after one that improves, and after one that does not.
 const GROWTH: [f64; 2] = [1.6, 0.8];
 
-/// The least first step of a sweep, as a share of the largest gap.
+/// Smallest first step of a sweep, as a share of the largest gap.
 const LEAST_STEP: f64 = 0.02;
 
-/// Points that every sweep sees, at least and for each sphere, and the share of the largest gap from which it sees
-/// all points.
+/// Points that every sweep sees, at least and for each sphere.
 const BASE: [usize; 2] = [6_000, 80];
+/// Share of the largest gap from which on a sweep sees all points.
 const FOCUS: f64 = 0.7;
 
-/// Failed swaps after which no other is tried.
+/// Failed swaps that end the swaps.
 const FAILURES: usize = 4;
 
-/// After a swap, rounds of steps, and the spheres nearest to it that take them.
+/// Rounds of steps after a swap, and nearest spheres that take them.
 const LOCAL: [usize; 2] = [4, 10];
 
-/// An inner ball smaller than this, in diagonals, is of no use.
+/// Radius below which an inner ball is left out, in diagonals.
 const SMALLEST_BALL: f64 = 1e-6;
 
-/// Equal radii that are tried, from that of the largest inner ball downwards, and the candidates of each.
+/// Number of equal radii that are tried, from that of the largest inner ball downwards.
 const RADII: i32 = 14;
+/// Ratio of such a radius to the one before.
 const RADIUS_STEP: f64 = 0.8;
+/// Candidates of each.
 const RADIUS_CANDIDATES: usize = 1_000;
 
-/// Times that a ball shrinks after a step.
+/// Limit of the shrinkings of a ball after a step.
 const SHRINKS: usize = 5;
 
 /// The solid, with its candidates and points.

@@ -14,10 +14,10 @@ use medial::simplifier::Diagnostics;
 
 use crate::Result;
 
-/// Added to the length of every edge, as in the authors' code, so that none is 0.
+/// Length added to every edge, as in the authors' code, so that none is 0.
 const LEAST_LENGTH: f64 = 1e-12;
 
-/// In place of the anchor of a vertex that none reaches.
+/// Anchor of a vertex that none reaches.
 const NO_ANCHOR: u32 = u32::MAX;
 
 /// A distance that orders by its value: none is negative, so that the bits ascend with it.

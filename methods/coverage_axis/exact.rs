@@ -13,10 +13,10 @@ use crate::Result;
 /// Limit of the nodes of branch and bound.
 const MAX_NODES: usize = 10_000;
 
-/// Nodes of branch and bound between two looks at the run.
+/// Nodes of branch and bound between two checks for cancellation.
 const NODES_OF_A_SLICE: u64 = 32;
 
-/// Non-zeros that are left at most: more would be the work of days.
+/// Limit of the non-zeros after the reductions. More would be the work of days.
 const MOST_ENTRIES: usize = 4_000_000;
 
 /// A cover, and how good it is known to be.

@@ -262,13 +262,13 @@ pub enum Select {
     Exact,
 }
 
-/// Dilations that mean something, in longest sides.
+/// Range of dilations, in longest sides.
 const DILATIONS: RangeInclusive<f64> = 1e-4..=1.0;
 
 // ----------------------------------------------------------------------------
 // The samples to be covered, and the spheres that may cover them.
 
-/// Balls below this radius, in diagonals, are dropped: their penalty would be without bound.
+/// Radius below which a ball is no candidate, in diagonals: its penalty has no bound.
 const LEAST_RADIUS: f64 = 1e-9;
 
 /// The input of a cover, in normalised units.

@@ -315,7 +315,7 @@ impl Directed {
 /// Bound on the rounding error of an excess, for coordinates of at most 1.
 pub(super) const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// Cones tried in the order of largest excess; the others follow in the order of the link.
+/// Cones tried in the order of largest excess. The others follow in the order of the link.
 const ROUNDS: usize = 4;
 
 /// Scratch for one hypothetical star after another.

@@ -355,7 +355,7 @@ fn by_error(quadric: &Quadric, [a, b]: [Sphere; 2]) -> [(f64, Sphere); 3] {
 // Spheres whose centres coincide up to rounding can form a knot that no single collapse undoes.
 // Since they are one point in space, they are contracted together, on the same terms.
 
-/// Betti numbers of single collapses are computed up to this many spheres.
+/// Spheres up to which Betti numbers of single collapses are computed.
 const MAX_UNLOCKED_SPHERES: usize = 500;
 
 /// Spheres that become one: the others are merged into the first in their order, each of which then

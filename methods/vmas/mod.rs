@@ -96,10 +96,10 @@ use crate::{Prepared, Result};
 /// Spheres of [`Level::Published`]: CGAL's default.
 const PUBLISHED: usize = 100;
 
-/// Samples for each sphere: fewer do not carry it, by CGAL's manual.
+/// Samples for each sphere. Fewer do not carry it, by CGAL's manual.
 const SAMPLES_PER_SPHERE: usize = 100;
 
-/// With `points=auto`, fewer vertices for each sphere than this call for samples.
+/// Vertices for each sphere below which `points=auto` takes samples.
 const VERTICES_PER_SPHERE: usize = 25;
 
 /// Smallest number of samples.

@@ -13,7 +13,7 @@ use wide::f64x4;
 /// Consecutive points that are assigned to spheres together.
 pub(super) const GROUP: usize = 64;
 
-/// Makes the samples differ from those of a judge with the same seed.
+/// Constant that separates the random numbers from those of a judge with the same seed.
 const STREAM: u64 = 0x766d_6173_5f70_7473;
 
 /// A tangent plane of a point.
@@ -231,7 +231,7 @@ pub(super) fn in_lanes<T>(four: &[T], none: f64, value: impl Fn(&T) -> f64) -> f
 // ----------------------------------------------------------------------------
 // The nearest samples of each sample.
 
-/// Samples in the first disc that is searched, as a multiple of those wanted: rarely too few.
+/// Samples in the first disc that is searched, in wanted ones: rarely too few.
 const AMPLE: f64 = 1.8;
 
 /// The `count` nearest points of each point, itself among them, by distance and then id; listed one point

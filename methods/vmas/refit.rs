@@ -13,10 +13,10 @@ use wide::f64x4;
 use super::points::{Locality, SurfacePoints, in_lanes};
 use super::sampling::Energy;
 
-/// Steps at most.
+/// Limit of the steps.
 const STEPS: usize = 10;
 
-/// Halvings of a step at most, until the sum of errors does not rise.
+/// Limit of the halvings of a step, until the sum of errors does not rise.
 const HALVINGS: usize = 12;
 
 /// Bound on the rounding error of a sum of errors, as a share of the sum of squared lengths in it.
@@ -25,7 +25,7 @@ const ROUNDING: f64 = 1e-14;
 /// Share of the largest diagonal element below which a pivot counts as zero.
 const FLAT: f64 = 1e-14;
 
-/// A squared distance from which a direction can be had.
+/// Squared distance up to which a point gives no direction.
 const NO_DIRECTION: f64 = 1e-300;
 
 /// The sphere that minimises the sum over a cluster, from `start`: at most [`STEPS`] steps, until one is shorter

@@ -15,16 +15,16 @@ use super::refit::{Residuals, refit};
 use super::{Points, VmasParams, edges, triangles};
 use crate::Result;
 
-/// A round whose total error changes by less than this is at rest; a fraction of the squared longest side.
+/// Change of the total error below which a round is at rest, in squared longest sides.
 const AT_REST: f64 = 1e-5;
 
-/// Spheres are split each time after this number of rounds, at rest or not.
+/// Rounds after which spheres are split, at rest or not.
 const SPLIT_EVERY: usize = 10;
 
-/// A refit ends with a step shorter than this, a fraction of the longest side.
+/// Step below which a refit ends, in longest sides.
 const SHORTEST_STEP: f64 = 1e-8;
 
-/// Rounds with splits that may pass without more spheres than ever before: clusters of new spheres that are
+/// Rounds with splits that may pass without more spheres than ever before. Clusters of new spheres that are
 /// dropped at once would keep the number below the target for ever.
 const PATIENCE: usize = 20;
 
@@ -200,7 +200,7 @@ fn largest_ball(points: &SurfacePoints, solid: &Solid<'_>) -> Option<Ball> {
 // `d` inside: there every plane distance `n . (v - c)` is at most `|v - c| < r`. The error of any one
 // sphere bounds the least error, and the sphere of the round before is rarely a bad one.
 
-/// The label of a point without a sphere.
+/// Label of a point without a sphere.
 pub(super) const NONE: u32 = u32::MAX;
 
 /// Relative and absolute excess of a bound over its rounding error; lengths are at most about 1.
@@ -313,8 +313,9 @@ pub(super) fn drop_small(spheres: &mut Vec<Sphere>, labels: &mut [u32], least: u
 // ----------------------------------------------------------------------------
 // Steps 4 and 5: the errors of the clusters, and which spheres are split.
 
-/// Share of the spheres that are split in a round, and their number at most.
+/// Share of the spheres that are split in a round.
 const SHARE: f64 = 0.2;
+/// Limit of the spheres that are split in a round.
 const MOST: usize = 10;
 
 /// How well a sphere fits its cluster.
@@ -463,7 +464,7 @@ impl Lanes {
 // ----------------------------------------------------------------------------
 // Step 3: a fitted centre is pushed back to the medial axis.
 
-/// A centre nearer to the surface than this gives no direction; a fraction of the diagonal.
+/// Distance to the surface up to which a centre gives no direction, a fraction of the diagonal.
 const ON_THE_SURFACE: f64 = 1e-12;
 
 /// The solid that spheres are corrected in.

@@ -27,8 +27,7 @@ class Options(TypedDict, total=False):
 class Angle(Options, total=False):
     """Options of `angle`."""
 
-    variant: Literal["vertex", "facet", "homotopy"]
-    theta: float  # degrees of separation angle
+    variant: Literal["vertex", "facet"]
 
 
 class Lambda(Options, total=False):

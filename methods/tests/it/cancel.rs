@@ -13,7 +13,7 @@ const PROMPT: Duration = Duration::from_secs(5);
 
 /// A shape on which methods take long, with the substrates that no flag interrupts.
 fn large_shape() -> Shape {
-    let mesh = medial_datasets::find("blob").expect("in the catalogue").mesh(96);
+    let mesh = medial_datasets::find("blob").expect("in the catalogue").mesh(48);
     let report = surface::validate(&mesh).expect("a solid");
     let shape = Shape::new("blob", &mesh, report, ShapeOptions::default()).expect("an extent");
     shape.initial().expect("an initial medial mesh");
@@ -30,11 +30,11 @@ fn every_method_ends_soon_after_it_is_cancelled() {
     let mut cancelled = Vec::new();
     for entry in medial_methods::registry() {
         let id = entry.method.info().id.to_string();
-        // At once, and in later phases.
         for delay in [0, 500].map(Duration::from_millis) {
             let run = RunContext::default();
             let flag = run.cancel_flag();
             let is_done = AtomicBool::new(false);
+            flag.store(delay.is_zero(), Relaxed);
             let (outcome, late) = thread::scope(|scope| {
                 let watch = scope.spawn(|| {
                     let began = Instant::now();
@@ -54,7 +54,6 @@ fn every_method_ends_soon_after_it_is_cancelled() {
             assert!(late < PROMPT, "{id}: {late:?} after the flag, which was set after {delay:?}");
             match outcome {
                 Err(SimplifyError::Cancelled) => cancelled.push(id.clone()),
-                // It was faster than the flag.
                 Ok(_) => {}
                 Err(error) => panic!("{id}: {error}"),
             }

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use medial::complex::betti;
 use medial::complex::collapse::{CollapseComplex, Hierarchy};
 use medial::shape::Shape;
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplification};
@@ -33,16 +32,6 @@ fn levels_are_those_of_the_collapse_engine() {
         complex.collapse(step.kept, step.removed, initial.spheres[step.kept as usize]);
     }
     assert_eq!(hierarchy.mesh(last), complex.to_mesh());
-}
-
-#[test]
-fn a_sampled_torus_keeps_its_loop_down_to_few_spheres() {
-    let shape = shape("torus", 26);
-    let mut simplification = prepare(&shape);
-    let at_100 = simplification.at(Level::Spheres(100)).expect("a count");
-    assert_eq!(betti(&at_100.mesh)[0], 1);
-    let end = simplification.at(Level::Spheres(1)).expect("the end");
-    assert_eq!((end.mesh.spheres.len(), betti(&end.mesh)), (1, [1, 0, 0]));
 }
 
 #[test]
