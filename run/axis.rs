@@ -241,7 +241,7 @@ pub fn read_external(path: &Path, bytes: &[u8], options: ReadOptions) -> Result<
 }
 
 fn read_surface(path: &Path, bytes: &[u8]) -> Result<LoadedMa, String> {
-    let surface = surface::inspect(path, bytes).map_err(|error| error.to_string())?.mesh;
+    let surface = surface::inspect_bytes(path, bytes).map_err(|error| error.to_string())?.mesh;
     let spheres = surface.vertices.iter().map(|&v| Sphere::new(v, 0.0)).collect();
     let mesh = MedialMesh::from_simplices(spheres, vec![], surface.faces);
     let mesh = mesh.map_err(|error| format!("{}: {error}", path.display()))?;

@@ -199,7 +199,7 @@ impl Input {
             Source::File(path) | Source::Cached(Cached { path, .. }) => {
                 // One read: the hash is that of the bytes that were parsed.
                 let bytes = surface::content(path)?;
-                let loaded = surface::inspect(path, &bytes)?.solid()?;
+                let loaded = surface::inspect_bytes(path, &bytes)?.solid()?;
                 Ok(Self {
                     name: source.name(),
                     hash: hex_digest(&bytes),

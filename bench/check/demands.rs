@@ -556,7 +556,7 @@ fn two(one: &TriMesh) -> TriMesh {
 /// A surface of the words of an OFF file behind its first.
 fn solid(words: &str) -> TriMesh {
     let text = format!("OFF {words}");
-    let loaded = surface::inspect(Path::new("solid.off"), text.as_bytes());
+    let loaded = surface::inspect_bytes(Path::new("solid.off"), text.as_bytes());
     loaded.expect("the solids of the corpus are surfaces").mesh
 }
 

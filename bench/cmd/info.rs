@@ -25,9 +25,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let (report, refusal) = match source.path() {
         Some(path) => {
             // Unlike a reader it continues at a defect: a defective mesh is the usual reason for this verb.
-            let inspection = surface::content(path)
-                .and_then(|bytes| surface::inspect(path, &bytes))
-                .map_err(Failure::input)?;
+            let inspection = surface::inspect(path).map_err(Failure::input)?;
             (inspection.report, inspection.refused)
         }
         None => (Input::load(&source)?.report, None),

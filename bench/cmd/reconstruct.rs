@@ -188,9 +188,7 @@ fn examine(
     if !path.is_file() {
         return surface::validate(mesh).map_err(Failure::input);
     }
-    let inspection = surface::content(path)
-        .and_then(|bytes| surface::inspect(path, &bytes))
-        .map_err(Failure::input)?;
+    let inspection = surface::inspect(path).map_err(Failure::input)?;
     warnings.extend(inspection.refused.map(|fault| fault.to_string()));
     warnings.extend(inspection.report.repairs.iter().map(ToString::to_string));
     warnings.extend(inspection.report.warnings.iter().cloned());

@@ -100,10 +100,10 @@ impl Inspection {
 /// ```
 pub fn read(path: impl AsRef<Path>) -> Result<Loaded, SurfaceError> {
     let path = path.as_ref();
-    inspect(path, &content(path)?)?.solid()
+    inspect(path)?.solid()
 }
 
-/// The bytes of a surface file, for [`inspect`].
+/// The bytes of a surface file, for [`inspect_bytes`].
 ///
 /// # Errors
 /// When it cannot be read, or is no regular file.
@@ -120,12 +120,23 @@ pub fn read_bytes(bytes: &[u8], format: Format) -> Result<Loaded, SurfaceError> 
     Ok(examine(bytes, format).and_then(accept)?)
 }
 
-/// Examines the bytes of the file `path`, which is not opened: hash and mesh of the same bytes cannot differ.
+/// Examines a surface that may be unfit for [`read`].
 ///
 /// # Errors
-/// When the bytes do not match the extension, or have no triangle with an area. A surface that is open, non-manifold or
-/// otherwise rejected is no error here; see [`Inspection::refused`].
-pub fn inspect(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Inspection, SurfaceError> {
+/// When the file cannot be read, does not match its extension, or has no triangle with an area. A surface that is open,
+/// non-manifold or otherwise rejected is no error here; see [`Inspection::refused`].
+pub fn inspect(path: impl AsRef<Path>) -> Result<Inspection, SurfaceError> {
+    let path = path.as_ref();
+    // Before the file is read, which may be large.
+    Format::of(path).map_err(|fault| in_file(path, fault))?;
+    inspect_bytes(path, &content(path)?)
+}
+
+/// [`inspect`] for the bytes of the file `path`, which is not opened: hash and mesh of the same bytes cannot differ.
+///
+/// # Errors
+/// As [`inspect`].
+pub fn inspect_bytes(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Inspection, SurfaceError> {
     let path = path.as_ref();
     let examined = Format::of(path).and_then(|format| examine(bytes, format));
     let check::Examined { mesh, report, fault } = examined.map_err(|fault| in_file(path, fault))?;

@@ -119,7 +119,7 @@ fn inspection_reports_surfaces_that_reading_rejects() {
     open.faces.truncate(10);
     let path = std::env::temp_dir().join(format!("medial-open-{}.off", std::process::id()));
     surface::write(&path, &open).unwrap();
-    let inspection = surface::inspect(&path, &surface::content(&path).unwrap()).unwrap();
+    let inspection = surface::inspect(&path).unwrap();
     std::fs::remove_file(&path).unwrap();
     assert!(matches!(inspection.refused.as_ref().unwrap().fault, Fault::Open { edges: 4, .. }));
     let json = serde_json::to_value(&inspection.report).unwrap();
