@@ -19,7 +19,7 @@ use medial_bench::plugin::ScriptLoader;
 use medial_bench::study::no_such_method;
 use medial_bench::study::registry::{Entry, Registry};
 use medial_run::level::Target;
-use medial_run::simplify::{self, Request};
+use medial_run::simplify::{Output as RunOutput, Request};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError};
 use pyo3::prelude::*;
@@ -139,7 +139,7 @@ pub fn simplify(
             certify: false,
             on_stage: &|stage| monitor.at(stage),
         };
-        let simplify::Output { simplify, result, search } =
+        let RunOutput { simplify, result, search } =
             request.run(level).map_err(Failure::of_fault)?;
         let mesh = in_input_units(&result.mesh, start.normalisation());
         let asked = simplify.level.to_string();
