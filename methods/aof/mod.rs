@@ -171,7 +171,7 @@ fn at(solid: &Solid<'_>, base: &Base, level: Level) -> Result<Simplified> {
             solid.axis(&base.descent, angle)?
         }
     };
-    solid.check_memory(base.resolution, solid.megabytes_with_output(base, &axis))?;
+    solid.check_memory(base.resolution, base.megabytes_with_output(&axis))?;
     let mesh = solid.medial_mesh(&axis)?;
     mesh.check()?;
     if axis.voxels.is_empty() {

@@ -31,7 +31,6 @@ use medial::simplifier::RunContext;
 use rayon::prelude::*;
 
 use super::lattice::{LatticeVoxels, Voxel};
-use super::solid::{BYTES_PER_VOXEL, Base, Solid};
 use super::thinning::{CENTRE, offset, ones, squared, touch};
 use crate::Result;
 
@@ -247,20 +246,17 @@ const PER_SIMPLEX: [f64; 3] = [16.0, 50.0, 40.0];
 /// Resident bytes for each byte in use: freed memory does not all return to the system.
 const RESIDENT: f64 = 1.75;
 
-impl Solid<'_> {
-    /// Memory for the voxels of a base and for the medial mesh of an axis, in megabytes.
-    pub(super) fn megabytes_with_output(&self, base: &Base, axis: &LatticeVoxels) -> f64 {
-        let voxels = axis.bricks();
-        let mut numbers = [0_u64; 3];
-        for voxel in &axis.voxels {
-            let own = simplices(voxels.neighbourhood(voxel.place));
-            numbers.iter_mut().zip(own).for_each(|(all, own)| *all += u64::from(own));
-        }
-        let simplices = numbers.iter().zip(PER_SIMPLEX).map(|(&n, bytes)| n as f64 * bytes);
-        let output = axis.voxels.len() as f64 * PER_VOXEL + simplices.sum::<f64>();
-        let start = base.descent.tally.start as f64 * BYTES_PER_VOXEL;
-        RESIDENT * (output + start) / 1e6
+/// Memory for the medial mesh of an axis next to other bytes, in megabytes.
+pub(super) fn megabytes(axis: &LatticeVoxels, other_bytes: f64) -> f64 {
+    let voxels = axis.bricks();
+    let mut numbers = [0_u64; 3];
+    for voxel in &axis.voxels {
+        let own = simplices(voxels.neighbourhood(voxel.place));
+        numbers.iter_mut().zip(own).for_each(|(all, own)| *all += u64::from(own));
     }
+    let simplices = numbers.iter().zip(PER_SIMPLEX).map(|(&n, bytes)| n as f64 * bytes);
+    let output = axis.voxels.len() as f64 * PER_VOXEL + simplices.sum::<f64>();
+    RESIDENT * (output + other_bytes) / 1e6
 }
 
 /// Edges, triangles and tetrahedra of mutually adjacent voxels of which a voxel is the first.

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::flux::{Sphere, Spiral, Surface};
 use super::lattice::{Descent, Grid, LatticeVoxels, Voxel, Wanted, betti, coarse_to_fine};
-use super::output::medial_mesh;
+use super::output::{medial_mesh, megabytes};
 use super::thinning::{FACES, Until, thin};
 use super::{LatticeSetting, MAX_RESOLUTION, PUBLISHED_RESOLUTION, Resolution, Rules, SAMPLES};
 use crate::Result;
@@ -142,6 +142,13 @@ impl TriedStart {
     fn difference(&self, expected: Option<[u64; 3]>) -> u64 {
         let expected = expected.unwrap_or(self.betti);
         self.betti.iter().zip(expected).map(|(&b, e)| b.abs_diff(e)).sum()
+    }
+}
+
+impl Base {
+    /// Memory for the voxels of this base and for the medial mesh of an axis, in megabytes.
+    pub(super) fn megabytes_with_output(&self, axis: &LatticeVoxels) -> f64 {
+        megabytes(axis, self.descent.tally.start as f64 * BYTES_PER_VOXEL)
     }
 }
 
@@ -339,7 +346,7 @@ impl Solid<'_> {
 
 /// Bytes for each voxel of the start set: values in bricks that are not full, twice while one is
 /// thinned, lists of blocks, the heap.
-pub(super) const BYTES_PER_VOXEL: f64 = 64.0;
+const BYTES_PER_VOXEL: f64 = 64.0;
 /// Limit of the voxels that a lattice for a count may visit.
 const MAX_VISITS: f64 = 2e7;
 
@@ -422,7 +429,7 @@ impl Solid<'_> {
         let mut base = self.base()?;
         for _ in 0..if is_free { MAX_LOWERINGS } else { 0 } {
             let axis = self.axis(&base.descent, self.setting.angle)?;
-            let share = self.megabytes_with_output(&base, &axis) / self.setting.max_megabytes;
+            let share = base.megabytes_with_output(&axis) / self.setting.max_megabytes;
             if share <= 1.0 {
                 break;
             }
@@ -687,7 +694,7 @@ mod tests {
         let solid = Solid::new(&shape, setting, RunContext::default()).expect("faces");
         let base = solid.base().expect("fits");
         let axis = solid.axis(&base.descent, 20.0).expect("not cancelled");
-        let needed = solid.megabytes_with_output(&base, &axis);
+        let needed = base.megabytes_with_output(&axis);
         assert!(needed > 4.0 && solid.check_memory(60, needed).is_err());
     }
 }

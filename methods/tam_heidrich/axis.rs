@@ -11,7 +11,7 @@ use medial::simplifier::{Diagnostics, RunContext};
 use medial::surface::TriangleBvh;
 use rayon::prelude::*;
 
-use super::parts::without_fins;
+use super::fins::without_fins;
 use crate::Result;
 use crate::levels::perturbed;
 

@@ -66,6 +66,7 @@
 //! - The power crust of the remaining poles (section 5) is not made.
 
 mod axis;
+mod fins;
 mod parts;
 mod schedule;
 #[cfg(test)]

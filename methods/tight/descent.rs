@@ -14,7 +14,7 @@ use super::goal::{
     residuals, vertices,
 };
 use super::guard::{Guard, Still, clamp};
-use super::swap::Part;
+use super::part::Part;
 use crate::Result;
 
 /// Longest step of a sphere, a fraction of the diagonal.

@@ -17,7 +17,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-use super::swap::Part;
+use super::part::Part;
 use crate::Result;
 
 /// Samples of the surface, below 500 spheres and from there on.

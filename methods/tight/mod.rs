@@ -52,6 +52,7 @@ mod collapse;
 mod descent;
 mod goal;
 mod guard;
+mod part;
 mod swap;
 #[cfg(test)]
 mod tests;

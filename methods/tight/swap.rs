@@ -13,6 +13,7 @@ use super::collapse::{self, Passed};
 use super::descent::{Descent, LEAST_RADIUS, Objective, Rest};
 use super::goal::{Edited, Goal, Kept, Points, Residuals, Row, union_of, vertices};
 use super::guard::{Still, corners};
+use super::part::Part;
 use crate::Result;
 
 /// Share of the largest error below which no sphere is inserted.
@@ -232,7 +233,7 @@ pub(super) fn settle(
     let (points, limits) = nearby(before, &kept, &union_of(&part.mesh)?, rest_of(mesh, &moving))?;
     let share = part.mesh.spheres.len() as f64 / mesh.spheres.len() as f64;
     let is_tangled = before.guard.is_tangled();
-    let still = Still { is_tangled, ..part.still(mesh, &moving) };
+    let still = Still { is_tangled, ..still(&part, mesh, &moving) };
     let Part { mesh: own, fixed, .. } = part;
     let around = Rest { fixed, limits, still };
     let mut descent = Descent::of_part(before.goal, points, own, around, share)?;
@@ -293,75 +294,18 @@ fn around(mesh: &MedialMesh, of: &[Option<u32>]) -> Vec<bool> {
     reached
 }
 
-/// The simplices with a moving corner, as a mesh of their own.
-pub(super) struct Part {
-    pub mesh: MedialMesh,
-    /// The places of its spheres in the whole mesh.
-    spheres: Vec<u32>,
-    /// Which of its spheres stay.
-    fixed: Vec<bool>,
-}
-
-impl Part {
-    pub fn of(mesh: &MedialMesh, moving: &[bool]) -> Self {
-        let is_moving = |v: &u32| moving[*v as usize];
-        let edges: Vec<_> = mesh.edges.iter().filter(|e| e.iter().any(is_moving)).collect();
-        let faces: Vec<_> = mesh.faces.iter().filter(|f| f.iter().any(is_moving)).collect();
-        let mut used = moving.to_vec();
-        edges.iter().for_each(|e| e.iter().for_each(|&v| used[v as usize] = true));
-        faces.iter().for_each(|f| f.iter().for_each(|&v| used[v as usize] = true));
-        // The side of a face opposite to its moving corner is part of the rest.
-        let sides = mesh.edges.iter().filter(|&&[a, b]| {
-            !is_moving(&a)
-                && !is_moving(&b)
-                && used[a as usize]
-                && used[b as usize]
-                && faces.iter().any(|f| f.contains(&a) && f.contains(&b))
-        });
-        let mut kept: Vec<[u32; 2]> = edges.into_iter().chain(sides).copied().collect();
-        kept.sort_unstable();
-        let spheres: Vec<u32> = (0..used.len() as u32).filter(|&v| used[v as usize]).collect();
-        let mut place = vec![0; used.len()];
-        for (new, &v) in (0..).zip(&spheres) {
-            place[v as usize] = new;
-        }
-        let edges = kept.into_iter().map(|e| e.map(|v| place[v as usize])).collect();
-        let faces = faces.into_iter().map(|f| f.map(|v| place[v as usize])).collect();
-        let fixed = spheres.iter().map(|v| !is_moving(v)).collect();
-        let own: Vec<Sphere> = spheres.iter().map(|&v| mesh.spheres[v as usize]).collect();
-        let mesh = MedialMesh { spheres: own, edges, faces, contacts: None };
-        Self { mesh, spheres, fixed }
+/// The faces of the whole mesh without a moving corner, with its spheres numbered as in the part, and
+/// those that are not in it after them.
+fn still(part: &Part, whole: &MedialMesh, moving: &[bool]) -> Still {
+    let own = part.spheres.len() as u32;
+    let mut place: Vec<u32> = (0..whole.spheres.len() as u32).map(|v| own + v).collect();
+    for (new, &v) in (0..).zip(&part.spheres) {
+        place[v as usize] = new;
     }
-
-    /// A primitive of the part, as one of the whole mesh.
-    pub fn in_whole(&self, whole: &MedialMesh, primitive: Primitive) -> Primitive {
-        let found = |place: Option<usize>| place.expect("the part is of the whole") as u32;
-        match primitive {
-            Primitive::Sphere(v) => Primitive::Sphere(self.spheres[v as usize]),
-            Primitive::Edge(e) => {
-                let edge = self.mesh.edges[e as usize].map(|v| self.spheres[v as usize]);
-                Primitive::Edge(found(whole.edges.binary_search(&edge).ok()))
-            }
-            Primitive::Face(f) => {
-                let face = self.mesh.faces[f as usize].map(|v| self.spheres[v as usize]);
-                Primitive::Face(found(whole.faces.binary_search(&face).ok()))
-            }
-        }
-    }
-
-    /// The faces of the whole mesh without a moving corner, with its spheres numbered as in the part, and
-    /// those that are not in it after them.
-    fn still(&self, whole: &MedialMesh, moving: &[bool]) -> Still {
-        let own = self.spheres.len() as u32;
-        let mut place: Vec<u32> = (0..whole.spheres.len() as u32).map(|v| own + v).collect();
-        for (new, &v) in (0..).zip(&self.spheres) {
-            place[v as usize] = new;
-        }
-        let still = whole.faces.iter().filter(|face| !face.iter().any(|&v| moving[v as usize]));
-        let (faces, corners) =
-            still.map(|face| (face.map(|v| place[v as usize]), corners(whole, *face))).unzip();
-        Still { faces, corners, is_tangled: false }
-    }
+    let still = whole.faces.iter().filter(|face| !face.iter().any(|&v| moving[v as usize]));
+    let (faces, corners) =
+        still.map(|face| (face.map(|v| place[v as usize]), corners(whole, *face))).unzip();
+    Still { faces, corners, is_tangled: false }
 }
 
 /// The simplices without a moving corner, if there are any.

@@ -74,6 +74,7 @@
 //! of three a false triangle. Betti numbers may differ from the solid's: the evaluation reports them, and nothing repairs them. CGAL's manual
 //! does not recommend more than 300 spheres, nor CAD models.
 
+mod energy;
 mod points;
 mod refit;
 mod sampling;

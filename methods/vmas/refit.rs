@@ -10,8 +10,8 @@ use medial::complex::Sphere;
 use rayon::prelude::*;
 use wide::f64x4;
 
+use super::energy::Energy;
 use super::points::{Locality, SurfacePoints, in_lanes};
-use super::sampling::Energy;
 
 /// Limit of the steps.
 const STEPS: usize = 10;

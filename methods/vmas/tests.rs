@@ -8,9 +8,10 @@ use medial::surface::TriMesh;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
+use super::energy::Energy;
 use super::points::{Locality, Oriented, SurfacePoints};
 use super::refit::{Residuals, refit};
-use super::sampling::{Clusters, Energy, Misfit, NONE, assign, drop_small, misfits, to_split};
+use super::sampling::{Clusters, Misfit, NONE, assign, drop_small, misfits, to_split};
 use super::{edges, triangles};
 
 const ENERGY: Energy = Energy { lambda: 0.2 };
