@@ -151,9 +151,6 @@ const FAR: f64 = 2.0;
 /// Ratio of the boxes of surface and fitted union at which they match.
 const BOX: Range<f64> = 0.8..1.25;
 
-/// Median misfit up to which radii are exact.
-const PRECISE: f64 = 1e-3;
-
 /// Limit of spheres for a fit, evenly taken from their list.
 const SPHERES: usize = 4000;
 
@@ -170,8 +167,8 @@ const NEARER: f64 = 2.0;
 /// Limit of steps of the optimisation. Where there is an optimum, far fewer suffice.
 const STEPS: usize = 60;
 
-/// Largest ratios of the mean distance of a preferred similarity to that of the best scale, and to that of the best scale
-/// and shift, whose four parameters follow the errors of the medial mesh.
+/// Largest ratios of the mean distance of a preferred similarity to that of the best scale, or of the optimum of the radii
+/// to that of the union, and to that of the best scale and shift, whose four parameters follow the errors of the medial mesh.
 const PREFERENCE: [f64; 2] = [1.5, 3.0];
 
 /// Mean distance of the surface to the union at which any convention is preferred, as a fraction of the diagonal.
@@ -218,12 +215,12 @@ impl Shape {
         // Radii of many simplified meshes are biased, their union is not: the optimum of the radii is a start then.
         let optimum = |start, source| {
             let by_radii = surface.optimised(&spheres, start, source);
-            let misfit = median(&surface.residuals(&spheres, &by_radii)).unwrap_or(0.0);
-            let by_union = match misfit <= PRECISE {
-                true => by_radii,
-                false => surface.nearest(&nearness, by_radii, source),
-            };
-            (nearness.of(&by_union), by_radii, by_union)
+            let by_union = surface.nearest(&nearness, by_radii, source);
+            let [of_radii, of_union] = [&by_radii, &by_union].map(|found| nearness.of(found));
+            match of_radii <= PREFERENCE[0] * of_union {
+                true => (of_radii, by_radii, by_radii),
+                false => (of_union, by_radii, by_union),
+            }
         };
         let scaled = optimum(least(&mut plain.into_iter()), FitSource::Scaled);
         let fitted = optimum(least(&mut all.chain([scaled.2])), FitSource::Fitted);
