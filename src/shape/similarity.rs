@@ -111,7 +111,7 @@ pub struct Fit {
     pub misfit: Option<f64>,
     /// Error that the fit itself can be, as a fraction of the diagonal: the largest displacement of the surface's bounding
     /// box between the similarities that fit the radii best, of all spheres and of every other one, and between the one of
-    /// all and this one; at least the misfit. 0 for conventions and factors, which are exact.
+    /// all and that of the nearest union; at least the misfit. 0 for conventions and factors, which are exact.
     pub uncertainty: f64,
     /// Whether the mesh has the wrong units without doubt: it fits with the similarity, to 1 % of the diagonal at the median
     /// (5 % for conventions and factors), and its union comes at least twice as near to the surface.
@@ -218,8 +218,8 @@ impl Shape {
             let by_union = surface.nearest(&nearness, by_radii, source);
             let [of_radii, of_union] = [&by_radii, &by_union].map(|found| nearness.of(found));
             match of_radii <= PREFERENCE[0] * of_union {
-                true => (of_radii, by_radii, by_radii),
-                false => (of_union, by_radii, by_union),
+                true => (of_radii, [by_radii, by_union], by_radii),
+                false => (of_union, [by_radii, by_union], by_union),
             }
         };
         let scaled = optimum(least(&mut plain.into_iter()), FitSource::Scaled);
@@ -233,8 +233,8 @@ impl Shape {
         let best = exact.into_iter().map(|(source, s)| (nearness.of(&s), source, s));
         let best = best.filter(|(near, source, _)| *near <= enough(source.has_no_shift()));
         let best = best.min_by(|a, b| a.0.total_cmp(&b.0));
-        let ((after, by_radii, normal), source) = match best {
-            Some((near, source, s)) => ((near, s, s), source),
+        let ((after, optima, normal), source) = match best {
+            Some((near, source, s)) => ((near, [s, s], s), source),
             None if scaled.0 <= enough(false) => (scaled, FitSource::Scaled),
             None => (fitted, FitSource::Fitted),
         };
@@ -254,7 +254,7 @@ impl Shape {
             source,
             misfit_before: Some(before),
             misfit: Some(misfit),
-            uncertainty: surface.uncertainty(&spheres, [&by_radii, &normal], source, misfit),
+            uncertainty: surface.uncertainty(&spheres, optima, source, misfit),
             is_needed,
         })
     }
@@ -386,7 +386,7 @@ impl Surface {
     fn uncertainty(
         &self,
         spheres: &[Sphere],
-        [by_radii, found]: [&Similarity; 2],
+        [by_radii, by_union]: [Similarity; 2],
         source: FitSource,
         misfit: f64,
     ) -> f64 {
@@ -404,9 +404,9 @@ impl Surface {
         };
         let halves = [0, 1].map(|first| {
             let half: Vec<Sphere> = spheres.iter().skip(first).step_by(2).copied().collect();
-            displacement(by_radii, &self.optimised(&half, *by_radii, source))
+            displacement(&by_radii, &self.optimised(&half, by_radii, source))
         });
-        halves.into_iter().fold(misfit.max(displacement(by_radii, found)), f64::max)
+        halves.into_iter().fold(misfit.max(displacement(&by_radii, &by_union)), f64::max)
     }
 
     /// From the box around the spheres to the box around the surface.
