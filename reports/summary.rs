@@ -87,7 +87,7 @@ impl Ratio {
 }
 
 impl SeriesSummary {
-    /// The mean of one of [`COMPARED`].
+    /// The mean of one of [`COMPARED`](crate::metric::COMPARED).
     pub(crate) fn mean(&self, metric: &Metric) -> Option<f64> {
         self.means.get(metric.key).map(|(mean, _)| *mean)
     }

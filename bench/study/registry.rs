@@ -183,7 +183,7 @@ impl Registry {
         self.entries.push(new);
     }
 
-    /// The method with an id, the chain of two (`FIRST+THEN`), [`INITIAL`] or [`GIVEN`](super::external::GIVEN).
+    /// The method with an id, the chain of two (`FIRST+THEN`), [`INITIAL`] or [`GIVEN`](medial_run::item::GIVEN).
     pub fn entry(&self, id: &str) -> Option<&Entry> {
         self.entries.iter().chain(&self.others).find(|entry| entry.id() == id)
     }

@@ -3,7 +3,7 @@
 //! A series is compared with itself alone, on one machine, under one set of conditions, on one content of its mesh: such
 //! runs make a `Track`. Machines that take turns have a track each.
 //!
-//! - Seconds are noisy: [`change_points`] finds their steps. A step that most series of the same runs make is that of the
+//! - Seconds are noisy: [`change_points()`] finds their steps. A step that most series of the same runs make is that of the
 //!   machine or of the compiler, and raises no alarm.
 //! - All other values are compared with the run before, by the comparison and the thresholds of [`diff`](crate::diff).
 

@@ -40,7 +40,7 @@ pub struct MethodInfo {
     /// from fine to coarse, with levels of one kind after one preparation, and the seconds of a level
     /// are those of all calls up to it. The seconds of other methods are those of each call alone.
     pub incremental: bool,
-    /// Whether results depend on [`RunContext::seed`].
+    /// Whether results depend on [`RunContext::seed`](crate::simplifier::RunContext::seed).
     pub seeded: bool,
     /// Whether there is one result for each shape, at [`Level::Published`]
     /// alone.
