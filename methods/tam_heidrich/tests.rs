@@ -9,7 +9,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::axis::{Axis, merged};
-use super::parts::{Parts, Remaining, levels, without_fins};
+use super::fins::without_fins;
+use super::parts::{Parts, Remaining, levels};
 
 fn complex(n: usize, edges: Vec<[u32; 2]>, faces: Vec<[u32; 3]>) -> MedialMesh {
     let spheres = (0..n).map(|i| Sphere::new(Vec3::splat(i as f64), 1.0)).collect();
