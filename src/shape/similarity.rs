@@ -230,8 +230,17 @@ impl Shape {
             let without = if has_no_shift { PREFERENCE[0] * scaled.0 } else { f64::INFINITY };
             with_shift.min(without).max(CLOSE)
         };
+        // What is within the uncertainty of the optimum may be right.
+        let [of_scaled, of_fitted] = [(scaled, FitSource::Scaled), (fitted, FitSource::Fitted)]
+            .map(|((_, optima, _), source)| surface.uncertainty(&spheres, optima, source, 0.0));
+        let is_within = |source: FitSource, s: &Similarity| match source.has_no_shift() {
+            true => surface.displacement(s, &scaled.2) <= of_scaled,
+            false => surface.displacement(s, &fitted.2) <= of_fitted,
+        };
         let best = exact.into_iter().map(|(source, s)| (nearness.of(&s), source, s));
-        let best = best.filter(|(near, source, _)| *near <= enough(source.has_no_shift()));
+        let best = best.filter(|(near, source, s)| {
+            *near <= enough(source.has_no_shift()) || is_within(*source, s)
+        });
         let best = best.min_by(|a, b| a.0.total_cmp(&b.0));
         let ((after, optima, normal), source) = match best {
             Some((near, source, s)) => ((near, [s, s], s), source),
@@ -382,6 +391,15 @@ impl Surface {
         Nearness { union: MedialUnion::new(&normal).ok(), points: &self.points }
     }
 
+    /// The largest displacement of a corner of the surface's box from one similarity to another.
+    fn displacement(&self, from: &Similarity, to: &Similarity) -> f64 {
+        let corner = |k: u32| {
+            Vec3::select(BVec3::new(k & 1 > 0, k & 2 > 0, k & 4 > 0), self.upper, self.lower)
+        };
+        let moved = |p: Vec3| p.distance(to.point((p - from.shift) / from.scale));
+        (0..8).map(|k| moved(corner(k))).fold(0.0, f64::max)
+    }
+
     /// [`Fit::uncertainty`] of a similarity.
     fn uncertainty(
         &self,
@@ -393,20 +411,12 @@ impl Surface {
         if !matches!(source, FitSource::Scaled | FitSource::Fitted) {
             return 0.0;
         }
-        let corners: Vec<Vec3> = (0..8)
-            .map(|k| {
-                Vec3::select(BVec3::new(k & 1 > 0, k & 2 > 0, k & 4 > 0), self.upper, self.lower)
-            })
-            .collect();
-        let displacement = |from: &Similarity, to: &Similarity| {
-            let moved = |&p: &Vec3| p.distance(to.point((p - from.shift) / from.scale));
-            corners.iter().map(moved).fold(0.0, f64::max)
-        };
         let halves = [0, 1].map(|first| {
             let half: Vec<Sphere> = spheres.iter().skip(first).step_by(2).copied().collect();
-            displacement(&by_radii, &self.optimised(&half, by_radii, source))
+            self.displacement(&by_radii, &self.optimised(&half, by_radii, source))
         });
-        halves.into_iter().fold(misfit.max(displacement(&by_radii, &by_union)), f64::max)
+        let between = self.displacement(&by_radii, &by_union);
+        halves.into_iter().fold(misfit.max(between), f64::max)
     }
 
     /// From the box around the spheres to the box around the surface.

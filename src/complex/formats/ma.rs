@@ -139,13 +139,15 @@ pub(super) fn lines<'a>(bytes: &'a [u8], file: &'a str) -> impl Iterator<Item = 
     })
 }
 
-/// The text of the last comment before the first line of [`lines`].
-pub(super) fn comment_above(bytes: &[u8]) -> Option<String> {
+/// The texts of the comments before the first line of [`lines`].
+pub(super) fn comments_above(bytes: &[u8]) -> Vec<String> {
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     let raw = bytes.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii);
     let comments = raw.take_while(|line| line.is_empty() || line.starts_with(b"#"));
-    let last = comments.filter(|line| !line.is_empty()).last()?;
-    Some(String::from_utf8_lossy(last).trim_start_matches('#').trim().to_owned())
+    let comments = comments.filter(|line| !line.is_empty());
+    comments
+        .map(|line| String::from_utf8_lossy(line).trim_start_matches('#').trim().to_owned())
+        .collect()
 }
 
 impl Line<'_> {

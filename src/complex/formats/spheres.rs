@@ -28,7 +28,7 @@ use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, SeqAccess, Vis
 use serde_json::{Map, Value};
 use serde_saphyr::{MessageFormatter, NonFiniteFloatPolicy, UserMessageFormatter};
 
-use super::ma::{canonical, comment_above, finite, lines, note, parse_ma};
+use super::ma::{canonical, comments_above, finite, lines, note, parse_ma};
 use super::{LoadedMa, MaError, MaErrorKind, ReadOptions, extension};
 use crate::complex::{MedialMesh, Sphere};
 use crate::{Vec3, parser_message, quoted, shortened};
@@ -208,14 +208,10 @@ pub(super) fn parse_rows(bytes: &[u8], name: &str, options: ReadOptions) -> Load
             continue;
         }
         if k == 0
-            && let Some(comment) = comment_above(bytes)
+            && let Some(found) = columns_of_comments(bytes, fields.len())
         {
-            let names = self::fields(&comment, separator_of(&comment));
-            // Other comments are prose.
-            if names.len() == fields.len() && names.iter().any(|name| is_column(name, "x")) {
-                columns = columns_of(&names).map_err(|why| line.malformed(why))?;
-                width = fields.len();
-            }
+            columns = found.map_err(|why| line.malformed(why))?;
+            width = fields.len();
         }
         if fields.len() != width {
             let found = quoted(&line.text);
@@ -242,6 +238,21 @@ const COLUMNS: [&str; 4] = ["x", "y", "z", "r"];
 
 fn is_column(field: &str, name: &str) -> bool {
     field.trim_matches('"').eq_ignore_ascii_case(name)
+}
+
+/// The columns that a comment above the rows names, which have this many fields. Other comments are prose.
+fn columns_of_comments(bytes: &[u8], count: usize) -> Option<Result<[usize; 4], String>> {
+    const RADII: [&str; 4] = ["r", "radius", "d", "diameter"];
+    comments_above(bytes).iter().rev().find_map(|comment| {
+        let names = fields(comment, separator_of(comment));
+        let first = |name: &str| name.split([' ', '[', '(']).next().unwrap_or_default().to_owned();
+        let is_radius = |name: &&str| RADII.iter().any(|radius| is_column(&first(name), radius));
+        // Four words about the radius are prose.
+        let is_list = separator_of(comment).is_some();
+        let is_header = names.iter().any(|name| is_column(&first(name), "x"))
+            || is_list && names.iter().any(is_radius);
+        (names.len() == count && is_header).then(|| columns_of(&names))
+    })
 }
 
 /// The places of `x`, `y`, `z` and the radius among the names of a header.
@@ -294,7 +305,18 @@ pub(super) fn parse_clump(bytes: &[u8], name: &str, options: ReadOptions) -> Loa
     };
     let mut first = lines(bytes, name).take(2).peekable();
     let is_clump = first.peek().is_some() && first.all(|line| is_row(&line.text));
-    if is_clump { parse_rows(bytes, name, options) } else { parse_ma(bytes, name, options) }
+    if is_clump {
+        return parse_rows(bytes, name, options);
+    }
+    match columns_of_comments(bytes, COLUMNS.len()) {
+        None | Some(Ok([0, 1, 2, 3])) => parse_ma(bytes, name, options),
+        Some(Err(why)) => Err(malformed(name, None, why)),
+        Some(Ok(_)) => {
+            let why =
+                "a comment names other columns (expected x y z r); write a list without counts";
+            Err(malformed(name, None, why.to_owned()))
+        }
+    }
 }
 
 /// Reads every list of spheres in a JSON document: an object for each, with `center` or `origin`, and `radius`.
@@ -407,24 +429,26 @@ fn collect(value: &Value, key: &str, links: &mut Vec<Link>) -> Result<(), String
             let spheres = spheres.collect::<Result<_, _>>()?;
             links.push(Link { name: key.to_owned(), spheres, ..Link::default() });
             // Spheres of a hierarchy have others inside.
-            let inner = items.iter().filter_map(Value::as_object).flatten();
-            inner.clone().try_for_each(|(key, value)| collect(value, key, links))
+            items.iter().filter_map(Value::as_object).try_for_each(|map| named(map, key, links))
         }
         Value::Array(items) => items.iter().try_for_each(|item| collect(item, key, links)),
-        Value::Object(map) => {
-            let is_named =
-                |(_, value): &(&String, &Value)| has_centre(value) && value.get("radius").is_some();
-            let named = map.iter().filter(is_named).map(|(name, item)| {
-                sphere(item).map_err(|why| format!("{}: {why}", shortened(name)))
-            });
-            let spheres: Vec<Sphere> = named.collect::<Result<_, _>>()?;
-            if !spheres.is_empty() {
-                links.push(Link { name: key.to_owned(), spheres, ..Link::default() });
-            }
-            map.iter().try_for_each(|(key, value)| collect(value, key, links))
-        }
+        Value::Object(map) => named(map, key, links),
         _ => Ok(()),
     }
+}
+
+/// Adds the spheres that are values of an object, and the lists below it.
+fn named(map: &Map<String, Value>, key: &str, links: &mut Vec<Link>) -> Result<(), String> {
+    let has_radius =
+        |item: &Value| ["radius", "r", "diameter"].iter().any(|k| item.get(k).is_some());
+    let spheres = map.iter().filter(|(_, item)| has_centre(item) && has_radius(item));
+    let spheres = spheres
+        .map(|(name, item)| sphere(item).map_err(|why| format!("{}: {why}", shortened(name))));
+    let spheres: Vec<Sphere> = spheres.collect::<Result<_, _>>()?;
+    if !spheres.is_empty() {
+        links.push(Link { name: key.to_owned(), spheres, ..Link::default() });
+    }
+    map.iter().try_for_each(|(key, value)| collect(value, key, links))
 }
 
 /// Names of a centre.
@@ -676,6 +700,7 @@ mod tests {
             ("x.csv", "Z,radius,id,y,X\n1,2,7,3,4\n", &[2.0]),
             ("x.csv", "x,y,z,r,g,b,radius\n0,0,0,255,1,1,4\n", &[4.0]),
             ("x.csv", "# radius,x,y,z\n1,10,20,30\n", &[1.0]),
+            ("x.csv", "# radius,x,y,z\n# units: m\n1,10,20,30\n", &[1.0]),
             ("x.csv", "# by a tool\n0,0,0,2\n", &[2.0]),
             ("x.json", "{\"tip\": {\"center\": [0, 0, 0], \"radius\": 2}, \"n\": 3}", &[2.0]),
             ("x.csv", "0, 0, 0, 1\r\n0, 0, 1, 2\r\n", &[1.0, 2.0]),
@@ -785,6 +810,11 @@ x.csv => x,y,z,r,g,b\n0,0,0,255,1,1\n => , line 1: no column r (found "x,y,z,r,g
 x.csv => x,y,z,r,radius\n0,0,0,5,1\n => , line 1: two columns of radii, r and radius
 x.csv => x,y,z,r,x\n0,0,0,5,1\n => , line 1: two columns x (found
 x.csv => # x,y,z,diameter\n0,0,0,5\n => , line 2: no column r (found "x,y,z,diameter"
+x.csv => # x [mm], y [mm], z [mm], diameter [mm]\n1,2,3,4\n => , line 2: no column x
+x.csv => # x,y,z,diameter\n# by a tool\n0,0,0,5\n => , line 3: no column r
+x.xyzr => # r x y z\n2\n1 10 20 30\n2 3 4 5\n => : a comment names other columns
+x.json => [{"center": [0, 0, 0], "radius": 1, "child": {"center": [0, 0, 0], "radius": 1}}] => : 2 links (
+x.json => {"a": {"center": [0, 0, 0], "r": 1}} => : a: the radius is missing
 x.json =>  => , line 1: EOF
 x.json => [{"center": [0, 0, 0], "radius": 1, "children": [{"center": [0, 0, 0], "radius": 1}]}] => : 2 links (
 x.json => [{"center": [0, 0, 0], "origin": [1, 0, 0], "radius": 1}] => : , sphere 1: two centers
