@@ -234,7 +234,9 @@ impl Shape {
         let [of_scaled, of_fitted] = [(scaled, FitSource::Scaled), (fitted, FitSource::Fitted)]
             .map(|((_, optima, _), source)| surface.uncertainty(&spheres, optima, source, 0.0));
         let is_within = |source: FitSource, s: &Similarity| match source.has_no_shift() {
-            true => surface.displacement(s, &scaled.2) <= of_scaled,
+            true => {
+                scaled.0 <= with_shift.max(CLOSE) && surface.displacement(s, &scaled.2) <= of_scaled
+            }
             false => surface.displacement(s, &fitted.2) <= of_fitted,
         };
         let best = exact.into_iter().map(|(source, s)| (nearness.of(&s), source, s));
