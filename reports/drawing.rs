@@ -207,12 +207,12 @@ impl Drawing {
         if matches!(show, Show::Error | Show::Reconstruction) {
             // As in `evaluate` by default: the drawn vertices are fewer and would give another number.
             let judge = (show == Show::Error).then(|| shape.judge(None, JudgeOptions::default()));
-            let failed = |name: &str, error| DrawError::Metric { name: name.to_owned(), error };
             let judge = judge.transpose()?;
             for (name, axis) in axes {
                 let mut made = Deviation::new(shape, name, axis, self.tolerance)?;
                 let measured = judge.as_ref().map(|judge| judge.distances(axis)).transpose();
-                let measured = measured.map_err(|error| failed(name, error))?;
+                let measured =
+                    measured.map_err(|error| DrawError::Metric { name: name.clone(), error })?;
                 made.hausdorff = measured.map(|distances| distances.hausdorff);
                 deviations.push(made);
             }

@@ -26,14 +26,14 @@ impl Evaluator<'_> {
     /// When the medial mesh has no union, or the certificate is too narrow.
     pub fn evaluate(&self, mesh: &MedialMesh) -> Result<Evaluation, MetricError> {
         let units = self.shape.normalisation();
-        let normal = |mesh: &MedialMesh| mesh.to_normal(units);
-        let mesh = normal(mesh);
+        let mesh = mesh.to_normal(units);
         let mesh = if self.spheres_alone { mesh.spheres_alone() } else { mesh };
         let mut evaluation = self.judge.evaluate_certified(&mesh, self.certify)?;
         // Points are looked for in the surface file.
         evaluation.move_witnesses(|point| units.backward(point));
         if let (Some(reference), Some(structure)) = (self.reference, &mut evaluation.structure) {
-            structure.known = Some(self.judge.sheet_difference(&mesh, &normal(reference))?);
+            structure.known =
+                Some(self.judge.sheet_difference(&mesh, &reference.to_normal(units))?);
         }
         Ok(evaluation)
     }

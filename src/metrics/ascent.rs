@@ -86,11 +86,19 @@ pub(super) struct OnUnion<'a> {
     pub surface: &'a TriangleBvh,
     /// Points deeper than this in the union are not on its boundary.
     pub burial: f64,
+    /// Width of a gap between two primitives that counts as none.
+    pub touching: f64,
 }
 
 impl Hill for OnUnion<'_> {
     fn near(&self, p: Vec3, near: &mut Near) -> Option<Peak> {
         let point = self.union.boundary_near(p, self.burial, &mut near.place)?;
+        // Not on a wall between primitives that touch, which is inside the union.
+        let (_, centre) = self.union.deepest_from(point, &mut near.place);
+        let outward = (point - centre?).try_normalize()? * self.touching;
+        if self.union.signed_from(point + outward, &mut near.place) < -0.5 * self.touching {
+            return None;
+        }
         let closest = self.surface.closest_from(point, near.face);
         near.face = Some(closest.face);
         Some(Peak { point, distance: closest.distance })
@@ -276,7 +284,7 @@ mod tests {
         // Their spheres meet in a circle, the lowest point of which is nearest to the square.
         let ball = |x: f64| Sphere::new(Vec3::new(0.5 + x, 0.5, -1.0), 0.5);
         let union = MedialUnion::of_spheres(&[ball(-0.3), ball(0.3)]).unwrap();
-        let hill = OnUnion { union: &union, surface: &tree, burial: 1e-12 };
+        let hill = OnUnion { union: &union, surface: &tree, burial: 1e-12, touching: 1e-7 };
         // Next to the pole that is farthest from the square.
         let found = best(&hill, &surface, &[Vec3::new(0.15, 0.55, -1.49)], 0.1);
         assert!((found.distance - 1.5).abs() < 1e-6, "{found:?}");

@@ -33,8 +33,7 @@
 //! threads.
 //!
 //! Rounding: all of this is double precision, whose errors, at coordinates of the order of the
-//! surface's diagonal, are below [`ROUNDING`] diagonals, and so is the growth of radii before a measurement. The
-//! interval is wider by both on both sides.
+//! surface's diagonal, are below [`ROUNDING`] diagonals. The interval is wider by that on both sides.
 
 use super::ascent::Peak;
 use super::bounds::{Bound, Largest, Pieces, ROUNDING, check_tolerance};
@@ -42,9 +41,8 @@ use super::depth::{Boundary, DOUBT, Depth};
 use super::error::MetricError;
 use super::evaluation::{Certificate, Witness, WitnessSide};
 use super::pieces::{
-    EXPOSED, Patches, Piece, burying, farthest, largest_distance, planar_frames, quartered,
+    EXPOSED, Patches, Piece, farthest, largest_distance, planar_frames, quartered,
 };
-use super::samples::grown;
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, NearestPrimitive};
 use crate::geometry::planar_frame::PlanarFrame;
@@ -76,11 +74,10 @@ pub fn certify(
     if surface.faces.is_empty() {
         return Err(MetricError::NoArea);
     }
-    let mesh = &grown(mesh, 1.0);
     let union = MedialUnion::new(mesh)?;
     let boundary = Boundary::new(&union, Patches::new(mesh, Vec3::AXES), 1.0);
-    // Both ends are widened by twice ROUNDING below; half of one more covers the rounding of these sums.
-    let goal = tolerance - 4.5 * ROUNDING;
+    // Both ends are widened by ROUNDING below; half of one more covers the rounding of these sums.
+    let goal = tolerance - 2.5 * ROUNDING;
     // A good lower bound before the first piece is divided: the maximum is often at a vertex.
     let depths = in_morton_order(&surface.vertices, |near, p| boundary.of(p, near).upper);
     let vertices = surface.vertices.iter().zip(depths);
@@ -101,8 +98,8 @@ pub fn certify(
         witness = Witness { point, on: WitnessSide::Union };
     }
     Ok(Certificate {
-        lower: (largest.lower - 2.0 * ROUNDING).max(0.0),
-        upper: largest.upper.max(largest.lower) + 2.0 * ROUNDING,
+        lower: (largest.lower - ROUNDING).max(0.0),
+        upper: largest.upper.max(largest.lower) + ROUNDING,
         tolerance,
         pieces: largest.pieces,
         witness,
@@ -250,10 +247,9 @@ impl Pieces for UnionSide<'_> {
         if lipschitz <= enough && closest.distance <= known {
             return Bound::above(lipschitz);
         }
-        let deepest = union.deepest_or(centre, &mut 0, burying(reach));
-        if patches.hulls.bury(deepest, reach, corners) {
+        let Some(deepest) = patches.unburied(union, piece, &enclosure, &mut 0) else {
             return Bound::above(0.0);
-        }
+        };
         let reached = if deepest.signed >= -EXPOSED { closest.distance } else { 0.0 };
         if lipschitz <= enough {
             return Bound { reached, at: centre, upper: lipschitz };

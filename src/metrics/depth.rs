@@ -22,7 +22,7 @@ use rayon::prelude::*;
 
 use super::ascent::Peak;
 use super::bounds::ROUNDING;
-use super::pieces::{EXPOSED, Enclosure, Patches, Piece, burying};
+use super::pieces::{EXPOSED, Enclosure, Patches, Piece};
 use crate::Vec3;
 use crate::complex::{MedialUnion, NearestPrimitive};
 use crate::geometry::trees::{PointTree, in_morton_order};
@@ -196,12 +196,9 @@ impl<'a> Boundary<'a> {
             }
             parts.clear();
             let enclosure = self.patches.enclose(&open.piece);
-            let (centre, corners) = (enclosure.centre, enclosure.corners());
-            let reach = enclosure.reach();
-            let deepest = self.union.deepest_or(centre, &mut near, burying(reach));
-            if self.patches.hulls.bury(deepest, reach, corners) {
-                continue;
-            }
+            let centre = enclosure.centre;
+            let deepest = self.patches.unburied(self.union, &open.piece, &enclosure, &mut near);
+            let Some(deepest) = deepest else { continue };
             if deepest.signed >= -EXPOSED && p.distance(centre) < depth.upper {
                 let (found, from) = self.union.deepest_from(centre, &mut near);
                 if let Some(outside) = self.leave(centre, found.signed, from, &mut near) {
@@ -223,7 +220,7 @@ impl<'a> Boundary<'a> {
         let ahead = heights.fold(f64::INFINITY, f64::min);
         // The piece is on the surface of a primitive, which is farther away than this.
         let primitive = match *piece {
-            Piece::Flat(_) => return ahead,
+            Piece::Flat(..) => return ahead,
             Piece::Round(v, _) => Sphere(v),
             Piece::Lateral(e, ..) => Edge(e),
         };

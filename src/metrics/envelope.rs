@@ -169,7 +169,7 @@ enum Surface {
     Sphere(Sphere),
     /// Start sphere, end sphere, frame.
     Lateral(Sphere, Sphere, ConeFrame),
-    Triangle([Vec3; 3]),
+    Triangle([Vec3; 3], Vec3),
 }
 
 /// A piece to be sampled, and where it is.
@@ -216,9 +216,10 @@ fn patches(mesh: &MedialMesh, pose: &Pose) -> Vec<Patch> {
         corners.sort_by_key(|&v| cells[v as usize]);
         let balls = mesh.spheres_of(corners);
         if let Some(planes) = Slab::new(balls).planes() {
+            let cells = of(&corners);
             for (normal, kind) in planes.normals().into_iter().zip(2..) {
-                let surface = Surface::Triangle(balls.map(|m| m.centre + m.radius * normal));
-                let cells = of(&corners);
+                let corners = balls.map(|m| m.centre + m.radius * normal);
+                let surface = Surface::Triangle(corners, normal);
                 patches.push(Patch { surface, kind, cells, neighbours: Vec::new() });
             }
         }
@@ -261,13 +262,16 @@ fn sample_patches(
             let mut rng = Pcg64::seed_from_u64(options.seed ^ patch.stream());
             patch.surface.sample(axes, count, &mut rng, &patch.neighbours, depth)
         });
-        let points = points.collect();
-        union.unburied(points, options.burial).into_iter().filter_map(|(point, signed)| {
-            let weight = (2.0 * (1.0 + signed / options.burial)).min(1.0);
-            // Without a burial depth only points in no primitive at all are on the boundary.
-            let weight = if options.burial > 0.0 { weight } else { 1.0 };
-            (weight > 0.0).then_some((point, weight))
-        })
+        // Probed from outside: a wall between primitives that touch is on the surface of both, and inside their union.
+        let probes = points.map(|[point, normal]| [point, point + 2.0 * options.burial * normal]);
+        union.unburied(&probes.collect::<Vec<_>>(), options.burial).into_iter().filter_map(
+            |(point, signed)| {
+                let weight = (2.0 * (1.0 + signed / options.burial)).min(1.0);
+                // Without a burial depth only points in no primitive at all are on the boundary.
+                let weight = if options.burial > 0.0 { weight } else { 1.0 };
+                (weight > 0.0).then_some((point, weight))
+            },
+        )
     });
     let (points, weights) = samples.unzip();
     Weighted { points, weights }
@@ -281,11 +285,11 @@ impl Surface {
                 let rise_squared = (1.0 - frame.s) * (1.0 + frame.s);
                 PI * rise_squared * a.centre.distance(b.centre) * (a.radius + b.radius)
             }
-            Self::Triangle([a, b, c]) => (b - a).cross(c - a).length() * 0.5,
+            Self::Triangle([a, b, c], _) => (b - a).cross(c - a).length() * 0.5,
         }
     }
 
-    /// Of `count` points the unburied ones, and some buried ones.
+    /// Of `count` points the unburied ones, and some buried ones, each with its outward normal.
     fn sample(
         &self,
         axes: [Vec3; 3],
@@ -293,7 +297,7 @@ impl Surface {
         rng: &mut Pcg64,
         neighbours: &[Sphere],
         depth: f64,
-    ) -> Vec<Vec3> {
+    ) -> Vec<[Vec3; 2]> {
         let shift = [rng.random::<f64>(), rng.random::<f64>()];
         let turn = match self {
             Self::Sphere(_) => {
@@ -304,7 +308,7 @@ impl Surface {
                 let v = across(frame, axes);
                 DMat3::from_cols(v, frame.u.cross(v), frame.u)
             }
-            Self::Triangle(_) => DMat3::IDENTITY,
+            Self::Triangle(..) => DMat3::IDENTITY,
         };
         let mut grid = Grid::new(if neighbours.is_empty() { 0 } else { count }, self.lengths());
         let all = [0..grid.sides[0], 0..grid.sides[1]];
@@ -318,7 +322,7 @@ impl Surface {
             Self::Lateral(..) => {
                 [(level(i) + shift[0]).fract(), (i as f64 * GOLDEN + shift[1]).fract()]
             }
-            Self::Triangle(_) => {
+            Self::Triangle(..) => {
                 let [s, t] = [0, 1].map(|k| (i as f64 * PLASTIC[k] + shift[k]).fract());
                 // The sequence fills a parallelogram; its other half is reflected into the triangle.
                 if s + t > 1.0 { [1.0 - s, 1.0 - t] } else { [s, t] }
@@ -327,7 +331,7 @@ impl Surface {
         let places = places.filter(|&place| !grid.is_buried(place));
         let points = places.map(|place| (place, self.normal(&turn, place)));
         let points = points.filter(|&(_, normal)| !self.is_buried(normal, 0.0, neighbours, depth));
-        points.map(|(place, normal)| self.at(place, normal)).collect()
+        points.map(|(place, normal)| [self.at(place, normal), normal]).collect()
     }
 
     /// The point at two coordinates from 0 to 1, of which equal areas of the square have equal areas of
@@ -342,14 +346,14 @@ impl Surface {
                 let m = a.lerp(*b, s * sum / (a.radius + radius));
                 m.centre + m.radius * normal
             }
-            Self::Triangle([a, b, c]) => *a + s * (*b - *a) + t * (*c - *a),
+            Self::Triangle([a, b, c], _) => *a + s * (*b - *a) + t * (*c - *a),
         }
     }
 
-    /// The normal at such coordinates; zero for a triangle.
+    /// The outward normal at such coordinates.
     fn normal(&self, turn: &DMat3, [s, t]: [f64; 2]) -> Vec3 {
-        if let Self::Triangle(_) = self {
-            return Vec3::ZERO;
+        if let Self::Triangle(_, normal) = self {
+            return *normal;
         }
         let (sin, cos) = (TAU * t).sin_cos();
         if let Self::Lateral(_, _, frame) = self {
@@ -365,7 +369,7 @@ impl Surface {
         match self {
             Self::Sphere(_) => [PI, TAU],
             Self::Lateral(..) => [0.0, TAU],
-            Self::Triangle(_) => [0.0; 2],
+            Self::Triangle(..) => [0.0; 2],
         }
     }
 
@@ -379,7 +383,7 @@ impl Surface {
                 let [low, middle, high] = [s0, s, s1].map(|s| (1.0 - 2.0 * s).acos());
                 (middle - low).max(high - middle) + around * middle.sin()
             }
-            Self::Lateral(..) | Self::Triangle(_) => around,
+            Self::Lateral(..) | Self::Triangle(..) => around,
         };
         (self.normal(turn, [s, t]), angle)
     }
@@ -390,7 +394,7 @@ impl Surface {
         let [a, b] = match self {
             Self::Sphere(m) => [m, m],
             Self::Lateral(a, b, _) => [a, b],
-            Self::Triangle(_) => return false,
+            Self::Triangle(..) => return false,
         };
         let radius = a.radius.min(b.radius);
         neighbours.iter().any(|c| {

@@ -27,12 +27,11 @@
 //!   primitives touch count more than once in `reverse_mean`.
 
 use super::ascent::{OnMesh, OnUnion, Peak, SEEDS, Start, ascend};
-use super::bounds::ROUNDING;
 use super::depth::Boundary;
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::error::MetricError;
 use super::evaluation::Distances;
-use super::pieces::{EXPOSED, Patches};
+use super::pieces::{BURIAL, EXPOSED, Patches};
 use super::samples::SurfaceSamples;
 use super::sweep::{FINAL_SHARE, swept};
 use crate::Vec3;
@@ -118,7 +117,12 @@ pub(super) fn distances_with_envelope(
     let reverse_mean = sampled.mean(&on_boundary);
     let reverse_samples = sampled.points.len();
     let mut envelope = Envelope { points: sampled.points.clone(), distances: on_boundary };
-    let hill = OnUnion { union, surface: bvh, burial: EXPOSED * pose.diameter() };
+    let hill = OnUnion {
+        union,
+        surface: bvh,
+        burial: EXPOSED * pose.diameter(),
+        touching: BURIAL * pose.diameter(),
+    };
     let (points, values) = (envelope.points.as_slice(), envelope.distances.as_slice());
     let peaks = ascend(&hill, &Start { points, values, ..start });
     envelope.extend(peaks);
@@ -172,10 +176,6 @@ pub(super) fn highest(
     let peaks: Vec<f64> = peaks.iter().map(|peak| peak.distance).collect();
     largest(&[largest(start.values), largest(&peaks)])
 }
-
-/// Depth, as a fraction of the surface's diameter, from which a sample of one primitive's surface
-/// counts as buried in another primitive, and not as on the union's boundary.
-pub(super) const BURIAL: f64 = ROUNDING;
 
 fn absolute(mut values: Vec<f64>) -> Vec<f64> {
     for value in &mut values {

@@ -203,9 +203,8 @@ impl Judge {
     /// # Errors
     /// As [`Judge::evaluate`], and when the tolerance is out of range or too fine.
     pub fn certify(&self, mesh: &MedialMesh, tolerance: f64) -> Result<Certificate, MetricError> {
-        let samples = self.samples()?;
-        samples.ordered(mesh)?;
-        certify(&self.surface, &self.tree, &samples.pose.in_order(mesh), tolerance)
+        let (mesh, _) = self.samples()?.ordered(mesh)?;
+        certify(&self.surface, &self.tree, &mesh, tolerance)
     }
 
     /// [`Judge::evaluate`], with the intervals of [`Judge::certify`] and [`Judge::cover`] of the width `certify`.
@@ -237,10 +236,7 @@ impl Judge {
     /// As [`Judge::certify`].
     pub fn cover(&self, mesh: &MedialMesh, tolerance: f64) -> Result<Cover, MetricError> {
         let samples = self.samples()?;
-        samples.ordered(mesh)?;
-        // Not grown: covers are proven with the radii as they are.
-        let mesh = samples.pose.in_order(mesh);
-        let union = MedialUnion::new(&mesh)?;
+        let (mesh, union) = samples.ordered(mesh)?;
         let test = CoverTest::new(&self.surface, &self.tree, &self.inside);
         let [uncovered, overshoot] = match mesh.edges.is_empty() {
             true => [

@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 
 use crate::Vec3;
-use crate::complex::{Incidence, MedialMesh, NearestPrimitive, Primitive};
+use crate::complex::{Incidence, MedialMesh, MedialUnion, NearestPrimitive, Primitive};
 use crate::geometry::planar_frame::PlanarFrame;
 use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
 use crate::surface::TriMesh;
@@ -102,9 +102,13 @@ pub(super) fn quartered(
 /// above rounding.
 pub(super) const EXPOSED: f64 = 1e-12;
 
+/// Width of a gap between two primitives, as a fraction of the surface's diameter, up to which it counts as none. Depth in
+/// another primitive from which a sample of one counts as buried.
+pub(super) const BURIAL: f64 = 1e-7;
+
 /// The signed distance at the centre of a piece below which a primitive buries all of a piece of this reach, and ends a
 /// search.
-pub(super) fn burying(reach: f64) -> f64 {
+fn burying(reach: f64) -> f64 {
     -(EXPOSED + reach) * (1.0 + 1e-9)
 }
 
@@ -124,8 +128,8 @@ pub(super) struct Patches<'a> {
 /// A part of the surface of one primitive.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Piece {
-    /// A part of a tangent triangle of a slab.
-    Flat([Vec3; 3]),
+    /// A part of a tangent triangle of a slab, and its outward unit normal.
+    Flat([Vec3; 3], Vec3),
     /// A spherical triangle: a sphere, and unit vectors towards its corners.
     Round(u32, [Vec3; 3]),
     /// A part of a cone's lateral: an edge, ranges of the share along the axis and of the angle
@@ -175,8 +179,9 @@ impl<'a> Patches<'a> {
         for corners in &self.mesh.faces {
             let corners = corners.map(|v| self.mesh.spheres[v as usize]);
             if let Some(planes) = Slab::new(corners).planes() {
-                let flat = planes.normals().map(|n| corners.map(|m| m.centre + m.radius * n));
-                pieces.extend(flat.map(Piece::Flat));
+                pieces.extend(planes.normals().map(|normal| {
+                    Piece::Flat(corners.map(|m| m.centre + m.radius * normal), normal)
+                }));
             }
         }
         pieces
@@ -196,7 +201,7 @@ impl<'a> Patches<'a> {
     pub fn normals(&self, piece: &Piece) -> ([Vec3; 6], usize) {
         let mut normals = [Vec3::ZERO; 6];
         match *piece {
-            Piece::Flat(_) => (normals, 0),
+            Piece::Flat(..) => (normals, 0),
             Piece::Round(_, [a, b, c]) => {
                 // Between the plane of its corners and the parallel tangent plane the piece is
                 // within the cone over its corners.
@@ -217,11 +222,51 @@ impl<'a> Patches<'a> {
         }
     }
 
+    /// The outward normal in the middle of a piece.
+    fn normal(&self, piece: &Piece) -> Vec3 {
+        match *piece {
+            Piece::Flat(_, normal) => normal,
+            Piece::Round(_, [a, b, c]) => (a + b + c).normalize(),
+            Piece::Lateral(edge, [t0, t1], [from, to]) => {
+                let (_, frame) = self.interpolated(edge, 0.5 * (t0 + t1));
+                lateral_normal(&frame, 0.5 * (from + to), 1.0)
+            }
+        }
+    }
+
+    /// The primitive that is deepest in the middle of a piece, searched from that at `near`; `None` where one contains
+    /// the whole piece.
+    ///
+    /// Tried for the piece moved outward by [`BURIAL`] before: a wall between primitives that touch is inside their
+    /// union, although each of its points is on the surface of both. The piece that is not moved is tried where that
+    /// differs, since next to the wall a moved piece may cross from one primitive to the other.
+    pub fn unburied(
+        &self,
+        union: &MedialUnion,
+        piece: &Piece,
+        enclosure: &Enclosure,
+        near: &mut usize,
+    ) -> Option<NearestPrimitive> {
+        let reach = enclosure.reach();
+        let mut deepest_at = |outward: Vec3| {
+            let corners = enclosure.corners.map(|corner| corner + outward);
+            let deepest = union.deepest_or(enclosure.centre + outward, near, burying(reach));
+            let is_buried = self.hulls.bury(deepest, reach, &corners[..enclosure.count]);
+            (!is_buried).then_some(deepest)
+        };
+        let moved = deepest_at(BURIAL * self.normal(piece))?;
+        if moved.signed >= BURIAL - EXPOSED {
+            return Some(moved);
+        }
+        let deepest = deepest_at(Vec3::ZERO)?;
+        Some(if moved.signed < deepest.signed { moved } else { deepest })
+    }
+
     pub fn enclose(&self, piece: &Piece) -> Enclosure {
         let (normals, count) = self.normals(piece);
         let normals = &normals[..count];
         match *piece {
-            Piece::Flat([a, b, c]) => Enclosure::new((a + b + c) / 3.0, [a, b, c]),
+            Piece::Flat([a, b, c], _) => Enclosure::new((a + b + c) / 3.0, [a, b, c]),
             Piece::Round(v, [a, b, c]) => {
                 let Sphere { centre, radius } = self.sphere(v);
                 let at = |direction: Vec3| centre + radius * direction;
@@ -242,8 +287,9 @@ impl<'a> Patches<'a> {
     /// Appends pieces that together cover a piece.
     pub fn divide(&self, piece: &Piece, parts: &mut Vec<Piece>) {
         match *piece {
-            Piece::Flat(triangle) => {
-                parts.extend(quartered(triangle, Vec3::midpoint).map(Piece::Flat));
+            Piece::Flat(triangle, normal) => {
+                let quarters = quartered(triangle, Vec3::midpoint);
+                parts.extend(quarters.map(|quarter| Piece::Flat(quarter, normal)));
             }
             Piece::Round(v, corners) => {
                 let parts_of = quartered(corners, |a, b| (a + b).normalize());

@@ -12,7 +12,6 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-use super::bounds::ROUNDING;
 use super::error::MetricError;
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, UnionError};
@@ -49,25 +48,14 @@ impl SurfaceSamples {
         Ok(Self { pose, points, uniform: count, spacing })
     }
 
-    /// A medial mesh with its spheres in the order of the pose and [`grown`] radii, and the union of its primitives.
+    /// A medial mesh with its spheres in the order of the pose, and the union of its primitives.
     pub fn ordered(&self, mesh: &MedialMesh) -> Result<(MedialMesh, MedialUnion), MetricError> {
         mesh.check().map_err(UnionError::from)?;
-        let ordered = grown(&self.pose.in_order(mesh), self.pose.diameter());
+        let ordered = self.pose.in_order(mesh);
         // A refusal names a sphere by its number in the mesh as it was given.
         let union = MedialUnion::new(&ordered).or_else(|_| MedialUnion::new(mesh))?;
         Ok((ordered, union))
     }
-}
-
-/// A medial mesh with all positive radii grown by [`ROUNDING`] diameters: a wall between primitives that touch is inside their
-/// union, although each of its points is on the surface of both.
-pub(super) fn grown(mesh: &MedialMesh, diameter: f64) -> MedialMesh {
-    let mut mesh = mesh.clone();
-    // Points, segments and triangles stay without a volume.
-    for sphere in mesh.spheres.iter_mut().filter(|sphere| sphere.radius > 0.0) {
-        sphere.radius += ROUNDING * diameter;
-    }
-    mesh
 }
 
 /// The area of a surface.

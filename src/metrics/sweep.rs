@@ -18,8 +18,8 @@ use super::ascent::{Hill, Peak, Start, ascend};
 use super::bounds::{Bound, Largest, Pieces};
 use super::depth::{Boundary, DOUBT};
 use super::pieces::{
-    EXPOSED, Patches, Piece, SECTORS, burying, farthest, largest_distance, lateral_normal,
-    neighbours, planar_frames, quartered,
+    EXPOSED, Patches, Piece, SECTORS, farthest, largest_distance, lateral_normal, neighbours,
+    planar_frames, quartered,
 };
 use crate::Vec3;
 use crate::complex::{MedialUnion, Primitive};
@@ -265,7 +265,7 @@ impl<'a> SweptUnion<'a> {
     fn others(&self, piece: &Piece) -> impl Iterator<Item = Other> {
         let [at_spheres, at_edges] = &self.neighbours;
         let (sphere, others): (_, &[Sphere]) = match *piece {
-            Piece::Flat(_) => (0, &[]),
+            Piece::Flat(..) => (0, &[]),
             Piece::Round(v, _) => (v, &at_spheres[v as usize]),
             Piece::Lateral(e, ..) => {
                 (self.patches.mesh.edges[e as usize][0], &at_edges[e as usize])
@@ -331,10 +331,7 @@ impl Surface for SweptUnion<'_> {
         if upper <= enough {
             return None;
         }
-        let deepest = self.union.deepest_or(centre, &mut near.place, burying(reach));
-        if self.patches.hulls.bury(deepest, reach, corners) {
-            return None;
-        }
+        let deepest = self.patches.unburied(self.union, piece, &enclosure, &mut near.place)?;
         *hint = Some((closest.face, deepest.primitive));
         let reached = if deepest.signed >= -EXPOSED { distance } else { 0.0 };
         Some(Bound { at: centre, reached, upper })

@@ -486,7 +486,10 @@ impl Surface {
         let directions = if source == FitSource::Scaled { 1 } else { 4 };
         let (mut best, mut least) = (start, nearness.of(&start));
         let [mut step, last] = SEARCH_STEPS;
-        while step >= last {
+        for _ in 0..STEPS {
+            if step < last {
+                break;
+            }
             let before = least;
             for direction in 0..directions {
                 for size in [step, -step] {
