@@ -41,11 +41,14 @@ impl Bound {
 pub(super) trait Pieces: Sync {
     /// One of them.
     type Piece: Send + Sync;
-    /// Results of the search for the piece before, which is mostly next to it.
-    type Near: Default;
+    /// What the pieces of a run hand on to the next one, which is mostly near.
+    type Near;
 
     /// Number of pieces that one thread bounds one after the other.
     const RUN: usize = 64;
+
+    /// What the first piece of a run gets.
+    fn near(&self) -> Self::Near;
 
     /// Prepares a round, when `lower` is reached.
     fn begin(&mut self, _pieces: &[Self::Piece], _lower: f64) {}
@@ -113,7 +116,7 @@ impl Largest {
             side.begin(&pieces, self.lower);
             let (lower, enough, shared) = (self.lower, side.enough(self.lower), &*side);
             let bounds = pieces.par_chunks_mut(P::RUN).flat_map_iter(|run| {
-                let mut near = P::Near::default();
+                let mut near = shared.near();
                 let bounds = run.iter_mut().map(|p| shared.bound(p, lower, enough, &mut near));
                 bounds.collect::<Vec<_>>()
             });

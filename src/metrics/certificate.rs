@@ -87,7 +87,7 @@ pub fn certify(
         deepest.unwrap_or(Peak { point: surface.vertices[0], distance: 0.0 });
     let mut largest = Largest::above(distance);
     let triangles = (0..surface.faces.len()).map(|face| surface.triangle(face));
-    let mut side = SurfaceSide { boundary: &boundary, goal };
+    let mut side = SurfaceSide { boundary: &boundary, goal, searched: 0 };
     largest.divide(&mut side, triangles.map(|triangle| (triangle, None)).collect())?;
     let mut witness =
         Witness { point: largest.witness.take().unwrap_or(point), on: WitnessSide::Surface };
@@ -118,6 +118,9 @@ impl Largest {
     }
 }
 
+/// Limit of pieces of the boundary in all searches of one round.
+const SEARCHED: usize = 1 << 25;
+
 // The first side: the distances from the triangles of the surface to the boundary of the union.
 
 /// Closer than this to the centre that attains a distance, the direction of its gradient is mostly
@@ -128,6 +131,8 @@ const MIN_ARM: f64 = 1e-9;
 struct SurfaceSide<'a> {
     boundary: &'a Boundary<'a>,
     goal: f64,
+    /// Number of pieces of the boundary that a run of this round may search.
+    searched: usize,
 }
 
 impl SurfaceSide<'_> {
@@ -163,7 +168,16 @@ impl SurfaceSide<'_> {
 impl Pieces for SurfaceSide<'_> {
     /// A triangle, and a point outside the union that was near to the triangle that it is a part of.
     type Piece = ([Vec3; 3], Option<Vec3>);
-    type Near = ();
+    /// Number of pieces of the boundary that may still be searched.
+    type Near = usize;
+
+    fn near(&self) -> usize {
+        self.searched
+    }
+
+    fn begin(&mut self, pieces: &[Self::Piece], _: f64) {
+        self.searched = SEARCHED / pieces.len().div_ceil(Self::RUN);
+    }
 
     fn enough(&self, lower: f64) -> f64 {
         lower + self.goal
@@ -174,7 +188,7 @@ impl Pieces for SurfaceSide<'_> {
         (triangle, outside): &mut Self::Piece,
         _: f64,
         enough: f64,
-        (): &mut (),
+        left: &mut usize,
     ) -> Bound {
         let centre = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
         let reach = farthest(centre, triangle);
@@ -205,7 +219,8 @@ impl Pieces for SurfaceSide<'_> {
             }
         }
         if depth.upper - depth.lower > DOUBT * reach.max(self.goal) {
-            depth = self.boundary.within(centre, depth, 0.5 * DOUBT * reach.max(self.goal));
+            let doubt = 0.5 * DOUBT * reach.max(self.goal);
+            depth = self.boundary.within(centre, depth, doubt, left);
         }
         if deepest.signed < 0.0 && depth.upper.is_finite() {
             *outside = Some(depth.outside);
@@ -231,6 +246,8 @@ struct UnionSide<'a> {
 impl Pieces for UnionSide<'_> {
     type Piece = Piece;
     type Near = ();
+
+    fn near(&self) {}
 
     fn enough(&self, lower: f64) -> f64 {
         lower + self.goal

@@ -436,6 +436,8 @@ impl<F: Fn(&mut Cube, f64) -> Bound + Sync> Cubes<F> {
 impl<F: Fn(&mut Cube, f64) -> Bound + Sync> Pieces for Cubes<F> {
     type Piece = Cube;
     type Near = ();
+
+    fn near(&self) {}
     const RUN: usize = 16;
 
     fn begin(&mut self, cubes: &[Cube], lower: f64) {

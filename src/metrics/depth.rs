@@ -30,11 +30,8 @@ use crate::geometry::trees::{PointTree, in_morton_order};
 /// Limit of primitives left one after the other.
 const MAX_EXITS: usize = 12;
 
-/// Limit of pieces in the search for one point. Then the bounds so far are returned.
-const MAX_PIECES: usize = 1 << 14;
-
-/// Limit of points searched for the largest depth. Then it is a lower bound only.
-const MAX_SEARCHES: usize = 256;
+/// Limit of pieces in all searches for the largest depth. Then it is a lower bound only.
+const MAX_PIECES: usize = 1 << 22;
 
 /// Width of the interval around a depth, as a share of the extent of a piece of the surface, above which a search halves
 /// it.
@@ -170,9 +167,9 @@ impl<'a> Boundary<'a> {
         }
     }
 
-    /// The depth of `p` in an interval no wider than `tolerance`, unless that would take too many pieces, from an
-    /// interval that is known.
-    pub fn within(&self, p: Vec3, known: Depth, tolerance: f64) -> Depth {
+    /// The depth of `p` in an interval no wider than `tolerance`, from an interval that is known. The interval may be
+    /// wider once no piece is `left`, from which those of this search are taken.
+    pub fn within(&self, p: Vec3, known: Depth, tolerance: f64, left: &mut usize) -> Depth {
         let mut depth = known;
         let (mut heap, mut near, mut parts, mut count) = (BinaryHeap::new(), 0, Vec::new(), 0);
         for &(piece, centre, reach) in self.initial() {
@@ -187,11 +184,12 @@ impl<'a> Boundary<'a> {
                 if least < depth.upper {
                     heap.push(Reverse(Open { least, id: count, piece }));
                     count += 1;
+                    *left = left.saturating_sub(1);
                 }
             }
             let Some(Reverse(open)) = heap.pop() else { break };
             depth.lower = open.least.clamp(depth.lower, depth.upper);
-            if depth.upper - depth.lower <= tolerance || count > MAX_PIECES {
+            if depth.upper - depth.lower <= tolerance || *left == 0 {
                 return depth;
             }
             parts.clear();
@@ -238,21 +236,20 @@ impl<'a> Boundary<'a> {
     }
 
     /// The largest distance to the boundary of some points, each given with an upper bound of its distance; a
-    /// lower bound of it after too many searches.
+    /// lower bound of it after searches over too many pieces.
     pub fn deepest_of(&self, mut peaks: Vec<Peak>) -> Option<Peak> {
         peaks.sort_by(|a, b| b.distance.total_cmp(&a.distance));
-        let (mut best, mut near, mut searches): (Option<Peak>, _, _) = (None, 0, 0);
+        let (mut best, mut near, mut left): (Option<Peak>, _, _) = (None, 0, MAX_PIECES);
         for peak in peaks {
             let most = best.map_or(f64::NEG_INFINITY, |best| best.distance);
-            if peak.distance <= most || searches == MAX_SEARCHES {
+            if peak.distance <= most || left == 0 {
                 break;
             }
             let mut depth = self.of(peak.point, &mut near);
             if !self.is_exact(&depth) && depth.upper > most {
-                searches += 1;
                 // Samples may lie on the boundary by rounding only: their distance is no proof.
                 depth.upper = depth.upper.min(peak.distance * (1.0 + SHARE) + self.margin);
-                depth = self.within(peak.point, depth, SHARE * depth.upper);
+                depth = self.within(peak.point, depth, SHARE * depth.upper, &mut left);
             }
             if depth.lower > most {
                 best = Some(Peak { point: peak.point, distance: depth.lower });

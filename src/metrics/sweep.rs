@@ -42,6 +42,9 @@ const PIECES: usize = 16;
 /// Limit of pieces for any number of samples.
 const MOST_PIECES: usize = 1 << 18;
 
+/// Limit of pieces of the boundary in all searches of one round.
+const SEARCHED: usize = 1 << 22;
+
 /// Limit of distances of the sweep from which an ascent starts.
 const SEEDS: usize = 6;
 
@@ -67,11 +70,12 @@ pub(super) fn swept(
     [forward, reverse]
 }
 
-/// Where the searches for the piece before ended.
-#[derive(Default)]
+/// Where the searches for the piece before ended, and how much they left.
 struct Near {
     place: usize,
     face: Option<u32>,
+    /// Number of pieces of the boundary that may still be searched.
+    left: usize,
 }
 
 /// Pieces that are swept: the largest ones are divided, and all distances above a known one are collected.
@@ -83,6 +87,8 @@ struct Swept<'a, S> {
     known: f64,
     /// Number of pieces that may still be bounded.
     left: usize,
+    /// Number of pieces of the boundary that a run of this round may search.
+    searched: usize,
     points: Vec<Vec3>,
     values: Vec<f64>,
 }
@@ -98,7 +104,7 @@ fn peaks_above<S: Surface>(
     let left = (PIECES * start.points.len()).min(MOST_PIECES);
     let floor = FLOOR * start.pose.diameter();
     let (points, values) = (Vec::new(), Vec::new());
-    let mut swept = Swept { side, share, floor, known, left, points, values };
+    let mut swept = Swept { side, share, floor, known, left, searched: 0, points, values };
     let mut largest = Largest::above(known);
     largest.search(&mut swept, pieces, usize::MAX).expect("the number of pieces is limited");
     let (points, values) = (&swept.points[..], &swept.values[..]);
@@ -111,8 +117,13 @@ impl<S: Surface> Pieces for Swept<'_, S> {
     type Near = Near;
     const RUN: usize = 256;
 
+    fn near(&self) -> Near {
+        Near { place: 0, face: None, left: self.searched }
+    }
+
     fn begin(&mut self, pieces: &[Self::Piece], _: f64) {
         self.left = self.left.saturating_sub(pieces.len());
+        self.searched = SEARCHED / pieces.len().div_ceil(Self::RUN);
     }
 
     fn enough(&self, lower: f64) -> f64 {
@@ -187,7 +198,10 @@ impl Surface for SweptSurface<'_> {
         if !self.boundary.is_exact(&depth) {
             depth = self.boundary.nearer(centre, depth);
             if depth.upper + reach > enough && depth.upper - depth.lower > DOUBT * reach {
-                depth = self.boundary.within(centre, depth, 0.5 * DOUBT * reach);
+                let doubt = DOUBT * reach;
+                depth = self.boundary.within(centre, depth, 0.5 * doubt, &mut near.left);
+                // Parts of a piece do not resolve what a search that had to end left open.
+                depth.upper = depth.upper.min(depth.lower + doubt);
             }
             *outside = Some(depth.outside);
         }

@@ -521,6 +521,32 @@ fn filled_cavities_are_as_far_as_their_walls() {
     }
 }
 
+/// Hundreds of balls fill a narrow tube, whose walls are far from the boundary, at almost the same distance everywhere: a
+/// search that decides one point looks at some ten thousand pieces.
+#[test]
+fn tubes_in_many_balls_are_certified() {
+    for seed in 0..3 {
+        let mut rng = Pcg64::seed_from_u64(seed);
+        let mut surface = block_without(Vec3::new(1.5, 1.0, 0.0), Vec3::new(1.51, 1.01, 1.0));
+        let size = Vec3::new(3.0, 2.0, 1.0);
+        let balls: Vec<_> = (0..300)
+            .map(|_| {
+                let centre = Vec3::from_array([0, 1, 2].map(|k| rng.random_range(0.0..size[k])));
+                let room = (0..3).map(|k| centre[k].min(size[k] - centre[k]));
+                (centre, room.fold(1.0, f64::min) * rng.random_range(0.8..1.03))
+            })
+            .collect();
+        let scale = 1.0 / 14_f64.sqrt();
+        surface.vertices.iter_mut().for_each(|v| *v *= scale);
+        let mesh = complex(&balls, &[], &[]).transformed(scale, |p| p * scale);
+        let measured = measure(&surface, &mesh).hausdorff;
+        let bvh = TriangleBvh::new(&surface).unwrap();
+        let found = certify(&surface, &bvh, &mesh, 2e-3).unwrap();
+        assert!(found.upper - found.lower <= 2e-3, "{found:?}");
+        assert!((0.99 * found.lower..=found.upper).contains(&measured), "{measured}: {found:?}");
+    }
+}
+
 /// Two plates, one on the other, with and without an overlap: the wall between them is inside their union.
 #[test]
 fn walls_between_primitives_that_touch_are_no_boundary() {
