@@ -11,6 +11,7 @@
 //! In a text file every element has its own line. Values behind the declared ones are ignored, as are other
 //! elements and properties, and lines or bytes after the last element.
 
+use std::collections::HashSet;
 use std::fmt;
 
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
@@ -21,7 +22,7 @@ use ply_rs_bw::ply::{
 use super::report::{Fault, Place};
 use super::soup::{PolygonSoup, checked_index};
 use super::text::{Cursor, count, quote};
-use crate::parser_message;
+use crate::{parser_message, quoted};
 
 /// The values of one row that matter here, each 0 where the header does not declare it.
 #[derive(Default)]
@@ -108,6 +109,16 @@ pub(crate) fn header(bytes: &[u8]) -> Result<Ply<'_>, Fault> {
     let header = Parser::<Row>::new()
         .read_header(&mut reader)
         .map_err(|error| fault(Place::Line(error.line().unwrap_or(1)), "a PLY header", &error))?;
+    let mut names = HashSet::new();
+    for (row, line) in (1..).zip(head.lines()) {
+        let name =
+            line.trim().strip_prefix("element").and_then(|rest| rest.split_whitespace().next());
+        // The parser keeps the last of several with one name, and would take rows of the first for its.
+        if let Some(name) = name.filter(|&name| !names.insert(name)) {
+            let expected = "elements of different names".to_owned();
+            return Err(Fault::Syntax { at: Place::Line(row), expected, found: quoted(name) });
+        }
+    }
     let line = reader.line();
     let text = header.encoding == Encoding::Ascii;
     let elements: Vec<ElementDef> = header.elements.into_values().collect();

@@ -266,7 +266,9 @@ fn columns_of(names: &[&str]) -> Result<[usize; 4], String> {
         }
     };
     // With green and blue, `r` is red.
-    let has_colour = place("g")?.is_some() && place("b")?.is_some();
+    let has =
+        |columns: [&str; 2]| names.iter().any(|name| columns.iter().any(|c| is_column(name, c)));
+    let has_colour = has(["g", "green"]) && has(["b", "blue"]);
     let radius = match (place("radius")?, if has_colour { None } else { place("r")? }) {
         (Some(_), Some(_)) => {
             return Err(format!("two columns of radii, r and radius (found {})", found()));
@@ -431,7 +433,18 @@ fn collect(value: &Value, key: &str, links: &mut Vec<Link>) -> Result<(), String
             // Spheres of a hierarchy have others inside.
             items.iter().filter_map(Value::as_object).try_for_each(|map| named(map, key, links))
         }
-        Value::Array(items) => items.iter().try_for_each(|item| collect(item, key, links)),
+        Value::Array(items) => {
+            let unnamed = items.iter().position(|item| has_radius(item) && has_point(item));
+            if let Some(k) = unnamed {
+                let names = CENTRES.join(", ");
+                let key = shortened(key);
+                return Err(format!(
+                    "{key}, sphere {}: none of the names of a center: {names}",
+                    k + 1
+                ));
+            }
+            items.iter().try_for_each(|item| collect(item, key, links))
+        }
         Value::Object(map) => named(map, key, links),
         _ => Ok(()),
     }
@@ -439,8 +452,6 @@ fn collect(value: &Value, key: &str, links: &mut Vec<Link>) -> Result<(), String
 
 /// Adds the spheres that are values of an object, and the lists below it.
 fn named(map: &Map<String, Value>, key: &str, links: &mut Vec<Link>) -> Result<(), String> {
-    let has_radius =
-        |item: &Value| ["radius", "r", "diameter"].iter().any(|k| item.get(k).is_some());
     let spheres = map.iter().filter(|(_, item)| has_centre(item) && has_radius(item));
     let spheres = spheres
         .map(|(name, item)| sphere(item).map_err(|why| format!("{}: {why}", shortened(name))));
@@ -449,6 +460,18 @@ fn named(map: &Map<String, Value>, key: &str, links: &mut Vec<Link>) -> Result<(
         links.push(Link { name: key.to_owned(), spheres, ..Link::default() });
     }
     map.iter().try_for_each(|(key, value)| collect(value, key, links))
+}
+
+fn has_radius(item: &Value) -> bool {
+    ["radius", "r", "diameter"].iter().any(|key| item.get(key).is_some())
+}
+
+/// Whether a value of an object is a list of three numbers.
+fn has_point(item: &Value) -> bool {
+    let is_point = |value: &Value| {
+        value.as_array().is_some_and(|list| list.len() == 3 && list.iter().all(Value::is_number))
+    };
+    item.as_object().is_some_and(|map| map.values().any(is_point))
 }
 
 /// Names of a centre.
@@ -543,7 +566,7 @@ fn child<'a, 'i>(parent: Node<'a, 'i>, tag: &str) -> Option<Node<'a, 'i>> {
 }
 
 /// Elements of MJCF that are not read.
-const UNREAD: [&str; 4] = ["frame", "replicate", "include", "attach"];
+const UNREAD: [&str; 6] = ["frame", "replicate", "include", "attach", "composite", "flexcomp"];
 
 /// Text of the centre and of the radius; `None` for another shape.
 type Attributes<'a> = Result<Option<[&'a str; 2]>, String>;
@@ -807,6 +830,9 @@ x.txt => x y z r\n1,5 2,5 3,5 1,25\n => , line 1: expected three counts
 x.xyzr => 0 0 0 1\n0 0 0 1\n1 000 0 0 1\n => , line 3: 5 fields instead of 4
 x.xyzr => 0 0 0 1\n0 0 1 inf\n => , line 2: the r "inf" is not
 x.csv => x,y,z,r,g,b\n0,0,0,255,1,1\n => , line 1: no column r (found "x,y,z,r,g,b"
+x.csv => x,y,z,r,green,blue\n0,0,0,255,1,1\n => , line 1: no column r (found "x,y,z,r,green,blue"
+x.ply => ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nproperty uchar r\nproperty uchar green\nproperty uchar blue\nend_header\n0 0 0 255 1 1\n => : element vertex has no property radius
+x.ply => ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nelement vertex 1\nproperty float x\nend_header\n0\n0\n => : line 5: expected elements of different names, found "vertex"
 x.csv => x,y,z,r,radius\n0,0,0,5,1\n => , line 1: two columns of radii, r and radius
 x.csv => x,y,z,r,x\n0,0,0,5,1\n => , line 1: two columns x (found
 x.csv => # x,y,z,diameter\n0,0,0,5\n => , line 2: no column r (found "x,y,z,diameter"
@@ -816,6 +842,7 @@ x.xyzr => # r x y z\n2\n1 10 20 30\n2 3 4 5\n => : a comment names other columns
 x.json => [{"center": [0, 0, 0], "radius": 1, "child": {"center": [0, 0, 0], "radius": 1}}] => : 2 links (
 x.json => {"a": {"center": [0, 0, 0], "r": 1}} => : a: the radius is missing
 x.json =>  => , line 1: EOF
+x.json => {"a": [{"center": [0, 0, 0], "radius": 1}], "b": [{"position": [0, 0, 0], "radius": 1}]} => : b, sphere 1: none of the names of a center
 x.json => [{"center": [0, 0, 0], "radius": 1, "children": [{"center": [0, 0, 0], "radius": 1}]}] => : 2 links (
 x.json => [{"center": [0, 0, 0], "origin": [1, 0, 0], "radius": 1}] => : , sphere 1: two centers
 x.json => {\n] => , line 2:
@@ -840,6 +867,7 @@ x.urdf => <robot><link><collision><geometry><sphere radius='1'/><sphere radius='
 x.urdf => <robot><link><collision><geometry><sphere radius='0 5'/></geometry></collision></link></robot> => , line 1: the radius "0 5" is not one number
 x.xml => <mujoco><worldbody>\n<frame pos='1 0 0'><geom size='1'/></frame></worldbody></mujoco> => , line 2: the element frame is not read; let
 x.xml => <mujoco><include file='a.xml'/><worldbody><geom size='1'/></worldbody></mujoco> => , line 1: the element include is not read
+x.xml => <mujoco><worldbody><body><composite type='cable' count='9 1 1'/><geom size='1'/></body></worldbody></mujoco> => , line 1: the element composite is not read
 x.xml => <mujoco><worldbody><geom class='none' size='1'/></worldbody></mujoco> => , line 1: unknown class "none"
 x.urdf => <sdf/> => : unknown root element (found "sdf", expected robot or mujoco)
 x.urdf => <!DOCTYPE r [<!ENTITY a 'b'>]><robot/> => , line 1:

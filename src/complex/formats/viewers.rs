@@ -122,12 +122,13 @@ pub fn parse_ply(
 
 fn read_ply(bytes: &[u8], options: ReadOptions) -> Result<LoadedMa, MaErrorKind> {
     let file = ply::header(bytes)?;
+    let has_colour = file.has("vertex", &["g", "green"]);
     let needed: [(&str, &[&str]); 7] = [
         ("vertex", &["x"]),
         ("vertex", &["y"]),
         ("vertex", &["z"]),
-        // With `g`, it is red.
-        ("vertex", if file.has("vertex", &["g"]) { &["radius"] } else { &["radius", "r"] }),
+        // With green, it is red.
+        ("vertex", if has_colour { &["radius"] } else { &["radius", "r"] }),
         ("edge", &["vertex1"]),
         ("edge", &["vertex2"]),
         ("face", &["vertex_indices", "vertex_index"]),
@@ -145,7 +146,7 @@ fn read_ply(bytes: &[u8], options: ReadOptions) -> Result<LoadedMa, MaErrorKind>
         }
     }
     let vertices = file.count("vertex");
-    let has_radius = file.has("vertex", &["radius", "g"]);
+    let has_radius = has_colour || file.has("vertex", &["radius"]);
     let (mut spheres, mut edges, mut faces) = (Vec::new(), Vec::new(), Vec::new());
     file.rows(|element, vertex, at, values| -> Result<(), MaErrorKind> {
         match (element, values.corners.as_slice()) {
