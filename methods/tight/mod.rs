@@ -433,7 +433,7 @@ struct Polish<'a> {
     run: &'a RunContext,
     /// Whether connectivity may change.
     swaps: bool,
-    /// The error bound, if there is one: far from it no swaps follow.
+    /// The error bound, if there is one: swaps follow only where they can bring the error to it.
     bound: Option<f64>,
 }
 
@@ -460,10 +460,14 @@ impl<'a> Polish<'a> {
         }
         let error = witnesses.join(&mut descent, f64::INFINITY)?;
         let (mut best, points) = self.rounds(descent, error, &mut witnesses)?;
-        if self.swaps && !self.bound.is_some_and(|bound| is_far(bound, best.error)) {
+        let is_hopeless = self.bound.is_some_and(|bound| best.error > RESCUED * bound);
+        if self.swaps && !is_hopeless && !self.is_within(&best) {
             let from = self.at(&best, points)?;
             let (from, helped) = self.swapped(from, &mut best, &mut witnesses)?;
             diagnostics.count("swaps_that_helped", helped);
+            if self.is_within(&best) {
+                return Ok(best);
+            }
             // With all the witnesses that were found meanwhile.
             let (again, _) = self.rounds(from, best.error, &mut witnesses)?;
             if again.error < best.error {
@@ -471,6 +475,11 @@ impl<'a> Polish<'a> {
             }
         }
         Ok(best)
+    }
+
+    /// Whether a state reaches the error that a bound aims at: a smaller error would help no one.
+    fn is_within(&self, state: &State) -> bool {
+        self.bound.is_some_and(|bound| state.error <= AIM * bound)
     }
 
     /// A descent from a state.
@@ -542,7 +551,7 @@ impl<'a> Polish<'a> {
             } else {
                 skipped += 1;
             }
-            if idle >= MAX_FAILURES {
+            if idle >= MAX_FAILURES || self.is_within(best) {
                 break;
             }
         }
@@ -639,22 +648,22 @@ const MORE: f64 = 1.3;
 /// Smallest and largest factor of the count after a miss.
 const GROWTH: [f64; 2] = [1.15, 1.6];
 
-/// Smallest share of a count within the bound that the next count has.
-const LEAST_SHARE: f64 = 0.35;
+/// Smallest and largest share of a count within the bound that the next count has.
+const SHARES: [f64; 2] = [0.35, 0.92];
 
 /// Range of errors that swaps and rounds can bring to the bound, in bounds.
 const NEAR: [f64; 2] = [0.5, WATCHED];
 
+/// Largest error after the rounds, in bounds, that swaps can bring to the bound.
+const RESCUED: f64 = 1.5;
+
 /// Error aimed at between a count within the bound and one that misses it, as a share of the first aim.
 const CLOSE: f64 = 0.97;
 
-/// Limit of the tried counts once one is within the bound: where another missed it closely, and
-/// elsewhere.
-const TRIALS: [usize; 2] = [3, 5];
-/// Ratio of a count within the bound to the largest miss, up to which that miss is close.
-const APART: f64 = 1.25;
-/// Share of a count within the bound above which another one is not worth a trial.
-const ALIKE: f64 = 0.93;
+/// Limit of the tried counts once one is within the bound.
+const TRIALS: usize = 4;
+/// Ratio of a count within the bound to the largest miss, up to which no count between them is tried.
+const APART: f64 = 1.15;
 
 /// Measured error that is aimed at, as a share of the bound.
 const AIM: f64 = 0.97;
@@ -731,10 +740,10 @@ impl Within<'_> {
                     } else {
                         between(held, missed, CLOSE * aim)
                     };
-                    wanted.clamp(few + 1, many - 1)
+                    wanted.min((SHARES[1] * many as f64) as usize).clamp(few + 1, many - 1)
                 }
                 (Some((spheres, error)), None) => {
-                    let share = (error / aim).powf(RATE).max(LEAST_SHARE);
+                    let share = (error / aim).powf(RATE).clamp(SHARES[0], SHARES[1]);
                     (spheres as f64 * share) as usize
                 }
                 (None, Some((spheres, _))) if spheres >= finest => break,
@@ -745,11 +754,8 @@ impl Within<'_> {
                 (None, None) => break,
             };
             let is_enough = |(spheres, _)| {
-                let spheres = spheres as f64;
-                let is_far = missed.is_none_or(|(missed, _)| spheres > APART * missed as f64);
-                wanted == 0
-                    || wanted as f64 > ALIKE * spheres
-                    || trials >= TRIALS[usize::from(is_far)]
+                let is_close = missed.is_some_and(|(few, _)| spheres as f64 <= APART * few as f64);
+                wanted == 0 || is_close || trials >= TRIALS
             };
             if held.is_some_and(is_enough) {
                 break;
