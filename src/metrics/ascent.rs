@@ -95,8 +95,8 @@ impl Hill for OnUnion<'_> {
         let point = self.union.boundary_near(p, self.burial, &mut near.place)?;
         // Not on a wall between primitives that touch, which is inside the union.
         let (_, centre) = self.union.deepest_from(point, &mut near.place);
-        let outward = (point - centre?).try_normalize()? * self.touching;
-        if self.union.signed_from(point + outward, &mut near.place) < -0.5 * self.touching {
+        let outward = (point - centre?).try_normalize()? * (2.0 * self.touching);
+        if self.union.signed_from(point + outward, &mut near.place) < -self.touching {
             return None;
         }
         let closest = self.surface.closest_from(point, near.face);

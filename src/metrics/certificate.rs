@@ -195,7 +195,7 @@ impl Pieces for SurfaceSide<'_> {
         let mut near = 0;
         let (deepest, attained_at) = self.boundary.union.deepest_from(centre, &mut near);
         let reached = deepest.signed.abs();
-        let mut depth = Depth { lower: reached, upper: reached, outside: centre };
+        let mut depth = Depth { lower: reached, upper: reached, outside: None };
         if deepest.signed < 0.0 {
             depth = self.boundary.from(centre, deepest.signed, attained_at, &mut near);
             if let Some(outside) = *outside {
@@ -208,9 +208,10 @@ impl Pieces for SurfaceSide<'_> {
         let above = self.above(triangle, enough, deepest).min(deepest.signed + reach);
         if above <= enough {
             // Points of the triangle in the union have the boundary on their way to points outside.
-            let (way, to_outside) = match deepest.signed < 0.0 {
-                true => (depth.outside - centre, farthest(depth.outside, triangle)),
-                false => (attained_at.map_or(Vec3::ZERO, |c| centre - c), f64::INFINITY),
+            let (way, to_outside) = match (depth.outside, attained_at) {
+                (Some(outside), _) => (outside - centre, farthest(outside, triangle)),
+                (None, Some(from)) if deepest.signed >= 0.0 => (centre - from, f64::INFINITY),
+                (None, _) => (Vec3::ZERO, f64::INFINITY),
             };
             let way = enough * way.normalize_or_zero();
             let [moved @ .., at] = [triangle[0], triangle[1], triangle[2], centre].map(|p| p + way);
@@ -222,9 +223,7 @@ impl Pieces for SurfaceSide<'_> {
             let doubt = 0.5 * DOUBT * reach.max(self.goal);
             depth = self.boundary.within(centre, depth, doubt, left);
         }
-        if deepest.signed < 0.0 && depth.upper.is_finite() {
-            *outside = Some(depth.outside);
-        }
+        *outside = depth.outside.or(*outside);
         Bound { reached: depth.lower, at: centre, upper: depth.upper + reach }
     }
 

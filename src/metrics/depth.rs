@@ -21,8 +21,7 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use super::ascent::Peak;
-use super::bounds::ROUNDING;
-use super::pieces::{EXPOSED, Enclosure, Patches, Piece};
+use super::pieces::{BURIAL, EXPOSED, Enclosure, Patches, Piece};
 use crate::Vec3;
 use crate::complex::{MedialUnion, NearestPrimitive};
 use crate::geometry::trees::{PointTree, in_morton_order};
@@ -44,10 +43,10 @@ const SHARE: f64 = 1e-4;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Depth {
     pub lower: f64,
+    /// Infinite while no point outside the union is known.
     pub upper: f64,
-    /// Outside the union at the distance `upper`, unless a search ended without such a point or both bounds
-    /// are exact.
-    pub outside: Vec3,
+    /// A point outside the union, at the distance `upper` or nearer.
+    pub outside: Option<Vec3>,
 }
 
 impl Depth {
@@ -55,7 +54,7 @@ impl Depth {
     pub fn with(mut self, p: Vec3, outside: Vec3) -> Self {
         let distance = p.distance(outside);
         if distance < self.upper {
-            (self.upper, self.outside) = (distance.max(self.lower), outside);
+            (self.upper, self.outside) = (distance.max(self.lower), Some(outside));
         }
         self
     }
@@ -65,7 +64,9 @@ impl Depth {
 pub(super) struct Boundary<'a> {
     pub union: &'a MedialUnion,
     pub patches: Patches<'a>,
-    /// Bound on rounding: points outside are outside by about as much.
+    /// Of the surface.
+    diameter: f64,
+    /// How far outside points are that are found outside: narrower gaps count as none.
     margin: f64,
     samples: Option<(PointTree, &'a [Vec3])>,
     /// Each with its centre and extent.
@@ -75,11 +76,11 @@ pub(super) struct Boundary<'a> {
 impl<'a> Boundary<'a> {
     /// The boundary of the union of the primitives in `patches`, next to a surface of a diameter.
     pub fn new(union: &'a MedialUnion, patches: Patches<'a>, diameter: f64) -> Self {
-        let margin = ROUNDING * diameter;
-        Self { union, patches, margin, samples: None, initial: OnceLock::new() }
+        let margin = BURIAL * diameter;
+        Self { union, patches, diameter, margin, samples: None, initial: OnceLock::new() }
     }
 
-    /// Whether the bounds agree up to rounding.
+    /// Whether the bounds agree up to the width of gaps that count as none.
     pub fn is_exact(&self, depth: &Depth) -> bool {
         // One exit ends a margin outside.
         depth.upper <= depth.lower + 3.0 * self.margin
@@ -129,14 +130,12 @@ impl<'a> Boundary<'a> {
     /// As [`of`](Self::of), for a point whose signed distance and nearest centre are known.
     pub fn from(&self, p: Vec3, signed: f64, centre: Option<Vec3>, near: &mut usize) -> Depth {
         if signed >= 0.0 || signed.is_nan() {
-            return Depth { lower: signed, upper: signed, outside: p };
+            return Depth { lower: signed, upper: signed, outside: None };
         }
+        let depth = Depth { lower: -signed, upper: f64::INFINITY, outside: None };
         match self.leave(p, signed, centre, near) {
-            Some(outside) => {
-                let upper = p.distance(outside).max(-signed);
-                Depth { lower: -signed, upper, outside }
-            }
-            None => Depth { lower: -signed, upper: f64::INFINITY, outside: p },
+            Some(outside) => depth.with(p, outside),
+            None => depth,
         }
     }
 
@@ -206,7 +205,8 @@ impl<'a> Boundary<'a> {
             self.patches.divide(&open.piece, &mut parts);
         }
         // No piece is nearer than the point outside.
-        Depth { lower: depth.upper, ..depth }
+        depth.lower = if depth.outside.is_some() { depth.upper } else { depth.lower };
+        depth
     }
 
     /// A lower bound of the distances from `p` to the points of a piece in an enclosure.
@@ -249,7 +249,9 @@ impl<'a> Boundary<'a> {
             if !self.is_exact(&depth) && depth.upper > most {
                 // Samples may lie on the boundary by rounding only: their distance is no proof.
                 depth.upper = depth.upper.min(peak.distance * (1.0 + SHARE) + self.margin);
-                depth = self.within(peak.point, depth, SHARE * depth.upper, &mut left);
+                // Without a point outside, the bound is infinite.
+                let tolerance = SHARE * depth.upper.min(self.diameter);
+                depth = self.within(peak.point, depth, tolerance, &mut left);
             }
             if depth.lower > most {
                 best = Some(Peak { point: peak.point, distance: depth.lower });

@@ -258,20 +258,22 @@ fn sample_patches(
     let depth = options.burial + MARGIN * low.distance(high);
     let runs = patches.par_chunks(RUN).zip(counts.par_chunks(RUN));
     let samples = runs.flat_map_iter(|(patches, counts)| {
-        let points = patches.iter().zip(counts).flat_map(|(patch, &count)| {
+        let places = patches.iter().zip(counts).flat_map(|(patch, &count)| {
             let mut rng = Pcg64::seed_from_u64(options.seed ^ patch.stream());
             patch.surface.sample(axes, count, &mut rng, &patch.neighbours, depth)
         });
-        // Probed from outside: a wall between primitives that touch is on the surface of both, and inside their union.
-        let probes = points.map(|[point, normal]| [point, point + 2.0 * options.burial * normal]);
-        union.unburied(&probes.collect::<Vec<_>>(), options.burial).into_iter().filter_map(
-            |(point, signed)| {
-                let weight = (2.0 * (1.0 + signed / options.burial)).min(1.0);
-                // Without a burial depth only points in no primitive at all are on the boundary.
-                let weight = if options.burial > 0.0 { weight } else { 1.0 };
-                (weight > 0.0).then_some((point, weight))
-            },
-        )
+        let (points, normals): (Vec<Vec3>, Vec<Vec3>) = places.map(|[p, n]| (p, n)).unzip();
+        let unburied = union.unburied(&points, options.burial).into_iter();
+        unburied.filter_map(move |(i, signed)| {
+            // Without a burial depth only points in no primitive at all are on the boundary.
+            if options.burial == 0.0 {
+                return Some((points[i], 1.0));
+            }
+            let weight = (2.0 * (1.0 + signed / options.burial)).min(1.0);
+            // Not on the wall of a gap so narrow that it counts as none.
+            let probe = points[i] + (options.burial - signed) * normals[i];
+            (weight > 0.0 && !union.buries(probe, 0.0)).then_some((points[i], weight))
+        })
     });
     let (points, weights) = samples.unzip();
     Weighted { points, weights }

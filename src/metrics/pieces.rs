@@ -123,6 +123,21 @@ pub(super) struct Patches<'a> {
     pub frames: Vec<Option<ConeFrame>>,
     /// The axes of the octants that spheres are divided into.
     axes: [Vec3; 3],
+    /// For each sphere the other ends of its edges, and for each edge the third corners of its faces.
+    neighbours: [Vec<Vec<Sphere>>; 2],
+}
+
+/// A sphere relative to another one.
+struct Other {
+    way: Vec3,
+    growth: f64,
+}
+
+impl Other {
+    /// How much farther it reaches in a direction; of a longer vector as well, for convex combinations.
+    fn height(&self, n: Vec3) -> f64 {
+        n.dot(self.way) + self.growth
+    }
 }
 
 /// A part of the surface of one primitive.
@@ -155,9 +170,10 @@ impl<'a> Patches<'a> {
             })
         };
         let frames = hulls.cones.iter().map(frame).collect();
-        Self { mesh, hulls, frames, axes }
+        Self { mesh, hulls, frames, axes, neighbours: neighbours(mesh) }
     }
 
+    /// The initial pieces. Laterals are cut where a face begins or ends to overtop them.
     pub fn pieces(&self) -> Vec<Piece> {
         let mut pieces = Vec::new();
         let [e, f, g] = self.axes;
@@ -169,11 +185,28 @@ impl<'a> Patches<'a> {
             }
         }
         for (edge, frame) in (0..).zip(&self.frames) {
-            if frame.is_some() {
-                pieces.extend((0..SECTORS).map(|k| {
-                    let sector = [k, k + 1].map(|k| TAU * f64::from(k) / f64::from(SECTORS));
-                    Piece::Lateral(edge, [0.0, 1.0], sector)
-                }));
+            let Some(frame) = frame else { continue };
+            let sectors = (0..=SECTORS).map(|k| TAU * f64::from(k) / f64::from(SECTORS));
+            let mut cuts: Vec<f64> = sectors.collect();
+            let normal = |angle| lateral_normal(frame, angle, 1.0);
+            for other in self.others(&Piece::Lateral(edge, [0.0, 1.0], [0.0, TAU])) {
+                // The height of the other sphere in the direction of the normal at an angle is a constant
+                // and a cosine.
+                let [start, quarter, half] =
+                    [0.0, 0.25, 0.5].map(|t| other.height(normal(t * TAU)));
+                let mean = 0.5 * (start + half);
+                let (cos, sin) = (start - mean, quarter - mean);
+                let swing = (-mean / cos.hypot(sin)).acos();
+                let cuts_of = [-swing, swing].map(|by| (sin.atan2(cos) + by).rem_euclid(TAU));
+                // Not a number if the height has the same sign all around.
+                cuts.extend(cuts_of.into_iter().filter(|cut| cut.is_finite()));
+            }
+            cuts.sort_by(f64::total_cmp);
+            for sector in cuts.windows(2) {
+                let piece = Piece::Lateral(edge, [0.0, 1.0], [sector[0], sector[1]]);
+                if !self.is_overtopped(&piece, &[normal(0.5 * (sector[0] + sector[1]))]) {
+                    pieces.push(piece);
+                }
             }
         }
         for corners in &self.mesh.faces {
@@ -185,6 +218,27 @@ impl<'a> Patches<'a> {
             }
         }
         pieces
+    }
+
+    /// The spheres that can reach farther than a curved piece.
+    fn others(&self, piece: &Piece) -> impl Iterator<Item = Other> {
+        let [at_spheres, at_edges] = &self.neighbours;
+        let (sphere, others): (_, &[Sphere]) = match *piece {
+            Piece::Flat(..) => (0, &[]),
+            Piece::Round(v, _) => (v, &at_spheres[v as usize]),
+            Piece::Lateral(e, ..) => (self.mesh.edges[e as usize][0], &at_edges[e as usize]),
+        };
+        let own = self.sphere(sphere);
+        others.iter().map(move |other| Other {
+            way: other.centre - own.centre,
+            growth: other.radius - own.radius,
+        })
+    }
+
+    /// Whether another sphere reaches farther in the direction of each normal of a curved piece. Then the primitive of both
+    /// contains it: a point of a sphere is on the surface of no hull that reaches farther in the direction of its normal.
+    pub fn is_overtopped(&self, piece: &Piece, normals: &[Vec3]) -> bool {
+        self.others(piece).any(|other| normals.iter().all(|&n| other.height(n) > EXPOSED))
     }
 
     pub fn sphere(&self, v: u32) -> Sphere {
@@ -247,6 +301,10 @@ impl<'a> Patches<'a> {
         enclosure: &Enclosure,
         near: &mut usize,
     ) -> Option<NearestPrimitive> {
+        let (normals, count) = self.normals(piece);
+        if self.is_overtopped(piece, &normals[..count]) {
+            return None;
+        }
         let reach = enclosure.reach();
         let mut deepest_at = |outward: Vec3| {
             let corners = enclosure.corners.map(|corner| corner + outward);

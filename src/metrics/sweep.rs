@@ -8,22 +8,16 @@
 //! 1. The change of a distance within a piece is estimated by its gradient at the centre.
 //! 2. A piece inherits the closest face and the deepest primitive of the piece that it is a part of.
 //!    Mostly one of these shows that the piece is irrelevant.
-//! 3. A point of a primitive's surface with the normal `n` is inside the primitive of a neighbouring
-//!    sphere that reaches farther in the direction `n`.
-//! 4. The number of pieces is limited. Those with the largest bounds come first.
-
-use std::f64::consts::TAU;
+//! 3. The number of pieces is limited. Those with the largest bounds come first.
 
 use super::ascent::{Hill, Peak, Start, ascend};
 use super::bounds::{Bound, Largest, Pieces};
 use super::depth::{Boundary, DOUBT};
 use super::pieces::{
-    EXPOSED, Patches, Piece, SECTORS, farthest, largest_distance, lateral_normal, neighbours,
-    planar_frames, quartered,
+    EXPOSED, Patches, Piece, farthest, largest_distance, planar_frames, quartered,
 };
 use crate::Vec3;
 use crate::complex::{MedialUnion, Primitive};
-use crate::geometry::Sphere;
 use crate::geometry::planar_frame::PlanarFrame;
 use crate::surface::{TriMesh, TriangleBvh};
 
@@ -203,7 +197,7 @@ impl Surface for SweptSurface<'_> {
                 // Parts of a piece do not resolve what a search that had to end left open.
                 depth.upper = depth.upper.min(depth.lower + doubt);
             }
-            *outside = Some(depth.outside);
+            *outside = depth.outside;
         }
         if depth.upper + reach <= enough {
             return None;
@@ -211,7 +205,7 @@ impl Surface for SweptSurface<'_> {
         let above = patches.hulls.largest_over(deepest.primitive, corners);
         // Inside, the distance grows away from the nearest point outside.
         let (gradient, here) = match deepest.signed < 0.0 {
-            true => (centre - depth.outside, depth.upper),
+            true => (depth.outside.map_or(Vec3::ZERO, |outside| centre - outside), depth.upper),
             false => (attained_at.map_or(Vec3::ZERO, |c| c - centre), -deepest.signed),
         };
         let upper = above.max(here + rise(gradient.normalize_or_zero(), centre, corners));
@@ -229,8 +223,6 @@ struct SweptUnion<'a> {
     triangles: Vec<PlanarFrame>,
     union: &'a MedialUnion,
     patches: &'a Patches<'a>,
-    /// For each sphere the other ends of its edges, and for each edge the third corners of its faces.
-    neighbours: [Vec<Vec<Sphere>>; 2],
 }
 
 /// A piece, the face that is closest to it and the primitive that is deepest there.
@@ -239,75 +231,11 @@ type Hinted = (Piece, Option<(u32, Primitive)>);
 impl<'a> SweptUnion<'a> {
     pub fn new((surface, bvh): (&TriMesh, &'a TriangleBvh), boundary: &'a Boundary<'a>) -> Self {
         let Boundary { union, patches, .. } = boundary;
-        let neighbours = neighbours(patches.mesh);
-        Self { bvh, triangles: planar_frames(surface), union, patches, neighbours }
+        Self { bvh, triangles: planar_frames(surface), union, patches }
     }
 
-    /// The initial pieces. Laterals are cut where a face begins or ends to overtop them.
     pub fn pieces(&self) -> Vec<Hinted> {
-        let mut pieces = self.patches.pieces();
-        pieces.retain(|piece| !matches!(piece, Piece::Lateral(..)));
-        for (edge, frame) in (0..).zip(&self.patches.frames) {
-            let Some(frame) = frame else { continue };
-            let sectors = (0..=SECTORS).map(|k| TAU * f64::from(k) / f64::from(SECTORS));
-            let mut cuts: Vec<f64> = sectors.collect();
-            let normal = |angle| lateral_normal(frame, angle, 1.0);
-            for other in self.others(&Piece::Lateral(edge, [0.0, 1.0], [0.0, TAU])) {
-                // The height of the other sphere in the direction of the normal at an angle is a constant
-                // and a cosine.
-                let [start, quarter, half] =
-                    [0.0, 0.25, 0.5].map(|t| other.height(normal(t * TAU)));
-                let mean = 0.5 * (start + half);
-                let (cos, sin) = (start - mean, quarter - mean);
-                let swing = (-mean / cos.hypot(sin)).acos();
-                let cuts_of = [-swing, swing].map(|by| (sin.atan2(cos) + by).rem_euclid(TAU));
-                // Not a number if the height has the same sign all around.
-                cuts.extend(cuts_of.into_iter().filter(|cut| cut.is_finite()));
-            }
-            cuts.sort_by(f64::total_cmp);
-            for sector in cuts.windows(2) {
-                let piece = Piece::Lateral(edge, [0.0, 1.0], [sector[0], sector[1]]);
-                if !self.is_overtopped(&piece, &[normal(0.5 * (sector[0] + sector[1]))]) {
-                    pieces.push(piece);
-                }
-            }
-        }
-        pieces.into_iter().map(|piece| (piece, None)).collect()
-    }
-
-    /// The spheres that can reach farther than a curved piece.
-    fn others(&self, piece: &Piece) -> impl Iterator<Item = Other> {
-        let [at_spheres, at_edges] = &self.neighbours;
-        let (sphere, others): (_, &[Sphere]) = match *piece {
-            Piece::Flat(..) => (0, &[]),
-            Piece::Round(v, _) => (v, &at_spheres[v as usize]),
-            Piece::Lateral(e, ..) => {
-                (self.patches.mesh.edges[e as usize][0], &at_edges[e as usize])
-            }
-        };
-        let own = self.patches.sphere(sphere);
-        others.iter().map(move |other| Other {
-            way: other.centre - own.centre,
-            growth: other.radius - own.radius,
-        })
-    }
-
-    /// Whether another sphere reaches farther in the direction of each normal of a curved piece.
-    fn is_overtopped(&self, piece: &Piece, normals: &[Vec3]) -> bool {
-        self.others(piece).any(|other| normals.iter().all(|&n| other.height(n) > EXPOSED))
-    }
-}
-
-/// A sphere relative to another one.
-struct Other {
-    way: Vec3,
-    growth: f64,
-}
-
-impl Other {
-    /// How much farther it reaches in a direction; of a longer vector as well, for convex combinations.
-    fn height(&self, n: Vec3) -> f64 {
-        n.dot(self.way) + self.growth
+        self.patches.pieces().into_iter().map(|piece| (piece, None)).collect()
     }
 }
 
@@ -316,7 +244,7 @@ impl Surface for SweptUnion<'_> {
 
     fn bound(&self, (piece, hint): &mut Hinted, enough: f64, near: &mut Near) -> Option<Bound> {
         let (normals, count) = self.patches.normals(piece);
-        if self.is_overtopped(piece, &normals[..count]) {
+        if self.patches.is_overtopped(piece, &normals[..count]) {
             return None;
         }
         let enclosure = self.patches.enclose(piece);
@@ -324,7 +252,7 @@ impl Surface for SweptUnion<'_> {
         let reach = enclosure.reach();
         if let Piece::Round(_, [a, b, c]) = *piece
             && reach > COARSE * enough
-            && self.is_overtopped(piece, &[(a + b + c).normalize()])
+            && self.patches.is_overtopped(piece, &[(a + b + c).normalize()])
         {
             // Too large for a bound by its distance, and buried.
             return Some(Bound::above(f64::INFINITY));

@@ -547,22 +547,55 @@ fn tubes_in_many_balls_are_certified() {
     }
 }
 
-/// Two plates, one on the other, with and without an overlap: the wall between them is inside their union.
+/// Two plates that overlap fill a cavity: ways out of the deeper one lead into the other, again and again.
+#[test]
+fn cavities_in_two_plates_are_certified() {
+    let scale = 1.0 / 14_f64.sqrt();
+    let cases = [0.2, 0.02, 1e-4, 1e-9, 0.0].map(|overlap| [(overlap, 0.05), (overlap, 0.001)]);
+    for (overlap, height) in cases.into_iter().flatten() {
+        let lo = Vec3::new(1.45, 0.95, 0.5 - height);
+        let mut surface = block_without(lo, Vec3::new(1.55, 1.05, 0.5 + height));
+        surface.vertices.iter_mut().for_each(|v| *v *= scale);
+        let bvh = TriangleBvh::new(&surface).unwrap();
+        let plate = |z: f64| {
+            [[0.3, 0.3], [2.7, 0.3], [2.7, 1.7], [0.3, 1.7]].map(|[x, y]| (Vec3::new(x, y, z), 0.3))
+        };
+        let offset = 0.3 - overlap / 2.0;
+        let spheres = [plate(0.5 - offset), plate(0.5 + offset)].concat();
+        let mesh = complex(&spheres, &[], &[[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]);
+        let mesh = mesh.transformed(scale, |p| p * scale);
+        // From half way up the walls to the outer side of either plate.
+        let exact = (0.6 - overlap / 2.0) * scale;
+        let measured = measure(&surface, &mesh).hausdorff;
+        let share = measured / exact;
+        assert!((0.999..1.0 + 1e-6).contains(&share), "{share} of {exact}, overlap {overlap}");
+        for tolerance in [1e-2, 1e-3] {
+            let found = certify(&surface, &bvh, &mesh, tolerance).unwrap();
+            assert!((found.lower..=found.upper).contains(&exact), "{exact}: {found:?}, {overlap}");
+            assert!(found.upper - found.lower <= tolerance);
+        }
+    }
+}
+
+/// Two plates, one on the other, with a gap, without, and with an overlap: the wall between them is inside their union
+/// unless a gap is wider than 1e-7 of the diagonal.
 #[test]
 fn walls_between_primitives_that_touch_are_no_boundary() {
     let (mut surface, _) = cuboid(4.0, 4.0, 2.0);
     surface.vertices.iter_mut().for_each(|v| *v /= 6.0);
     let bvh = TriangleBvh::new(&surface).unwrap();
-    for overlap in [0.0, 1e-12, 1e-9, 1e-7, 1e-4] {
+    for overlap in [-1e-5, -1e-6, -3e-7, -1e-8, 0.0, 1e-12, 1e-9, 1e-7, 1e-4] {
         let plate = |z: f64| {
             [[0.5, 0.5], [3.5, 0.5], [3.5, 3.5], [0.5, 3.5]].map(|[x, y]| (Vec3::new(x, y, z), 0.5))
         };
         let spheres = [plate(0.5), plate(1.5 - overlap)].concat();
         let mesh = complex(&spheres, &[], &[[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]);
         let mesh = mesh.transformed(1.0 / 6.0, |p| p / 6.0);
-        // From the bottom of the notch around the plates, where their rims meet at an edge of the box, to its sides.
+        // From the bottom of the notch around the plates, where their rims meet at an edge of the box, to its sides; from
+        // the middle of a gap to the ends of the box.
         let half = (1.0 - overlap) / 2.0;
-        let exact = (0.5 - f64::sqrt((0.25 - half * half) / 2.0)) / 6.0;
+        let notch = (0.5 - f64::sqrt((0.25 - half * half).max(0.0) / 2.0)) / 6.0;
+        let exact = if overlap < -6e-7 { 1.0 / 6.0 } else { notch };
         let measured = measure(&surface, &mesh).hausdorff;
         let share = measured / exact;
         assert!((0.97..1.0 + 1e-6).contains(&share), "{share} of {exact}, overlap {overlap}");

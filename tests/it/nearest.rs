@@ -220,8 +220,8 @@ fn union_distances_match_brute_force() {
         let queries: Vec<Vec3> = (0..600).map(|_| vector(&mut rng) * 2.0).collect();
         let (signed, nearest) =
             (union.signed_batch(&queries), union.unsigned_nearest_batch(&queries));
-        let probes: Vec<_> = queries.iter().map(|&p| [p, p]).collect();
-        let unburied = union.unburied(&probes, 1e-3);
+        let unburied = union.unburied(&queries, 1e-3).into_iter();
+        let unburied: Vec<_> = unburied.map(|(i, signed)| (queries[i], signed)).collect();
         let one_by_one: Vec<(Vec3, f64)> = std::iter::zip(&queries, &signed)
             .map(|(&p, &s)| (p, s))
             .filter(|q| q.1 >= -1e-3)

@@ -303,14 +303,14 @@ impl MedialUnion {
         self.parts.any_below(p, -depth).is_some()
     }
 
-    /// Of pairs of a point and its probe, the points where no primitive [`buries`](Self::buries) either deeper than
-    /// `depth`, in their order, with their [`signed`](Self::signed) distances. Fast if few primitives bury most points,
-    /// as on the surface of another primitive.
-    pub fn unburied(&self, points: &[[Vec3; 2]], depth: f64) -> Vec<(Vec3, f64)> {
+    /// The places of the points that no primitive [`buries`](Self::buries) deeper than `depth`, in their order, with
+    /// their [`signed`](Self::signed) distances. Fast if few primitives bury most points, as on the
+    /// surface of another primitive.
+    pub fn unburied(&self, points: &[Vec3], depth: f64) -> Vec<(usize, f64)> {
         // Primitives that buried a point are tried first, the most recent one before the others.
         let mut recent = [None; RECENT];
         let mut near = 0;
-        let signed = |&[p, probe]: &[Vec3; 2]| {
+        let mut signed = |p: Vec3| {
             let again = recent.iter().position(|place: &Option<usize>| {
                 place.is_some_and(|place| self.parts.shape(place).signed(p) < -depth)
             });
@@ -324,10 +324,9 @@ impl MedialUnion {
                 recent[..=again.unwrap_or(RECENT - 1)].rotate_right(1);
                 recent[0] = burier;
             }
-            signed.filter(|_| !self.buries(probe, depth))
+            signed
         };
-        let signed: Vec<_> = points.iter().map(signed).collect();
-        points.iter().zip(signed).filter_map(|(&[p, _], signed)| Some((p, signed?))).collect()
+        points.iter().enumerate().filter_map(|(i, &p)| Some((i, signed(p)?))).collect()
     }
 
     /// Calls `each` for all primitives nearer to `p` than `limit` by signed distance, with that
