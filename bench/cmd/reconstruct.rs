@@ -201,8 +201,8 @@ fn other_topology(union: [u64; 3], report: &SurfaceReport) -> Option<String> {
     let found = betti_of(report)?;
     (found != union).then(|| {
         format!(
-            "the surface has other Betti numbers than the union (found {found:?}, expected {union:?}): it \
-             lacks narrow crevices, holes or necks; give a smaller tolerance"
+            "the surface has other Betti numbers than balls in the union (found {found:?}, expected {union:?}): it \
+             lacks narrow crevices, holes or necks, or they have false ones; give a smaller tolerance"
         )
     })
 }

@@ -418,7 +418,26 @@ pub(super) fn parse_yaml(bytes: &[u8], name: &str, options: ReadOptions) -> Load
 fn from_document(document: &Value, name: &str, options: ReadOptions) -> Loaded {
     let mut links = Vec::new();
     collect(document, "", &mut links).map_err(|why| malformed(name, None, why))?;
-    chosen(links, name, options)
+    let mut loaded = chosen(links, name, options)?;
+    if has_key(document, BUFFER) {
+        loaded.notes.push(format!("{BUFFER} was not added to the radii"));
+    }
+    Ok(loaded)
+}
+
+/// What cuRobo adds to all radii when it uses a file.
+const BUFFER: &str = "collision_sphere_buffer";
+
+/// Whether some object in a document has a key with another value than zero.
+fn has_key(document: &Value, key: &str) -> bool {
+    match document {
+        Value::Array(items) => items.iter().any(|item| has_key(item, key)),
+        Value::Object(map) => {
+            map.get(key).is_some_and(|value| value.as_f64() != Some(0.0))
+                || map.values().any(|value| has_key(value, key))
+        }
+        _ => false,
+    }
 }
 
 /// Adds the lists of spheres in `value`, whose key is `key`. The readers bound the depth of `value`.
@@ -519,6 +538,13 @@ pub(super) fn parse_xml(bytes: &[u8], name: &str, options: ReadOptions) -> Loade
             return Err(malformed(name, None, why));
         }
     };
+    let macros =
+        |node: &Node<'_, '_>| node.tag_name().namespace().is_some_and(|n| n.contains("xacro"));
+    if let Some(node) = document.descendants().find(macros) {
+        let row = document.text_pos_at(node.range().start).row as usize;
+        let why = "macros of xacro are not read; write the robot by `xacro FILE -o ROBOT.urdf`";
+        return Err(malformed(name, Some(row), why.to_owned()));
+    }
     // Positions in a frame are relative to it, and the others stand for elements that are not in the file.
     let unread = document.descendants().find(|node| UNREAD.contains(&node.tag_name().name()));
     if let Some(node) = unread.filter(|_| shape == "geom") {
@@ -579,7 +605,11 @@ fn of_collision<'a>(element: Node<'a, '_>) -> Attributes<'a> {
     if shapes.next().is_some() {
         return Err("several shapes in one collision element; give one to each".to_owned());
     }
-    let origin = child(element, "origin").and_then(|origin| origin.attribute("xyz"));
+    let mut origins = element.children().filter(|node| node.has_tag_name("origin"));
+    let origin = origins.next().and_then(|origin| origin.attribute("xyz"));
+    if origins.next().is_some() {
+        return Err("several origins in one collision element".to_owned());
+    }
     // Without a position, a shape is at the origin of its link.
     let sphere = shape.filter(|shape| shape.has_tag_name("sphere"));
     Ok(sphere
@@ -699,6 +729,9 @@ mod tests {
         let loaded = load("x.yml", curobo).unwrap();
         assert_eq!(loaded.mesh.spheres, [Sphere::new(Vec3::new(0.0, 0.0, 0.1), 0.5)]);
         assert_eq!(loaded.notes, ["1 sphere was dropped: negative radius"]);
+        let buffer = "collision_sphere_buffer: 0.01\na: [{center: [0, 0, 0], radius: 1}]\n";
+        let notes = load("x.yml", buffer).unwrap().notes;
+        assert_eq!(notes, ["collision_sphere_buffer was not added to the radii"]);
         let urdf = "<!-- x --><robot name='r'><link name='a'><visual><geometry><sphere radius='9'/></geometry></visual>\
                     <collision><geometry><sphere radius='2'/></geometry></collision>\
                     <collision><geometry><box size='1 1 1'/></geometry></collision></link><link name='b'/></robot>";
@@ -869,6 +902,8 @@ x.xml => <mujoco><worldbody>\n<frame pos='1 0 0'><geom size='1'/></frame></world
 x.xml => <mujoco><include file='a.xml'/><worldbody><geom size='1'/></worldbody></mujoco> => , line 1: the element include is not read
 x.xml => <mujoco><worldbody><body><composite type='cable' count='9 1 1'/><geom size='1'/></body></worldbody></mujoco> => , line 1: the element composite is not read
 x.xml => <mujoco><worldbody><geom class='none' size='1'/></worldbody></mujoco> => , line 1: unknown class "none"
+x.urdf => <robot xmlns:xacro="http://www.ros.org/wiki/xacro">\n<xacro:macro name="a"><link/></xacro:macro></robot> => , line 2: macros of xacro are not read
+x.urdf => <robot><link><collision><origin xyz='0 0 0'/><origin xyz='1 0 0'/><geometry><sphere radius='1'/></geometry></collision></link></robot> => , line 1: several origins
 x.urdf => <sdf/> => : unknown root element (found "sdf", expected robot or mujoco)
 x.urdf => <!DOCTYPE r [<!ENTITY a 'b'>]><robot/> => , line 1:
 x.urdf => <robot>\n<link><collision><geometry><sphere/></geometry></collision></link></robot> => , line 2: the radius is missing
