@@ -263,6 +263,10 @@ impl Pieces for UnionSide<'_> {
         if lipschitz <= enough && closest.distance <= known {
             return Bound::above(lipschitz);
         }
+        let (normals, count) = patches.normals(piece);
+        if patches.is_overtopped(piece, &normals[..count]) {
+            return Bound::above(0.0);
+        }
         let Some(deepest) = patches.unburied(union, piece, &enclosure, &mut 0) else {
             return Bound::above(0.0);
         };

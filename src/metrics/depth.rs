@@ -192,6 +192,10 @@ impl<'a> Boundary<'a> {
                 return depth;
             }
             parts.clear();
+            let (normals, count) = self.patches.normals(&open.piece);
+            if self.patches.is_overtopped(&open.piece, &normals[..count]) {
+                continue;
+            }
             let enclosure = self.patches.enclose(&open.piece);
             let centre = enclosure.centre;
             let deepest = self.patches.unburied(self.union, &open.piece, &enclosure, &mut near);

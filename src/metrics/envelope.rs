@@ -263,15 +263,19 @@ fn sample_patches(
             patch.surface.sample(axes, count, &mut rng, &patch.neighbours, depth)
         });
         let (points, normals): (Vec<Vec3>, Vec<Vec3>) = places.map(|[p, n]| (p, n)).unzip();
-        let unburied = union.unburied(&points, options.burial).into_iter();
-        unburied.filter_map(move |(i, signed)| {
-            // Without a burial depth only points in no primitive at all are on the boundary.
-            if options.burial == 0.0 {
+        // Without a burial depth only points in no primitive at all are on the boundary.
+        let burial = options.burial;
+        let above = points.iter().zip(&normals).map(|(&p, &n)| p + burial * n);
+        let unburied = union.unburied(&above.collect::<Vec<_>>(), 2.0 * burial).into_iter();
+        unburied.filter_map(move |(i, above)| {
+            // Nothing else is near to most.
+            if above >= 0.999 * burial {
                 return Some((points[i], 1.0));
             }
-            let weight = (2.0 * (1.0 + signed / options.burial)).min(1.0);
+            let signed = union.signed(points[i]);
+            let weight = (2.0 * (1.0 + signed / burial)).min(1.0);
             // Not on the wall of a gap so narrow that it counts as none.
-            let probe = points[i] + (options.burial - signed) * normals[i];
+            let probe = points[i] + (burial - signed) * normals[i];
             (weight > 0.0 && !union.buries(probe, 0.0)).then_some((points[i], weight))
         })
     });

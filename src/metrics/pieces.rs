@@ -301,10 +301,6 @@ impl<'a> Patches<'a> {
         enclosure: &Enclosure,
         near: &mut usize,
     ) -> Option<NearestPrimitive> {
-        let (normals, count) = self.normals(piece);
-        if self.is_overtopped(piece, &normals[..count]) {
-            return None;
-        }
         let reach = enclosure.reach();
         let mut deepest_at = |outward: Vec3| {
             let corners = enclosure.corners.map(|corner| corner + outward);
