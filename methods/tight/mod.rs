@@ -628,7 +628,7 @@ impl TightParams {
 // The level by error: few spheres whose two-sided error a certificate holds within a bound.
 //
 // One descent through the counts, until the largest error at samples says that the bound is near. From its meshes
-// the rounds are made for the count that is reached, and for one or two that its error foretells.
+// the rounds are made for the count that is reached, and for a few that its error foretells.
 
 /// Largest error at samples at which the descent ends, in errors aimed at. Swaps and rounds lower it by
 /// about this factor.
@@ -708,7 +708,8 @@ impl Within<'_> {
         // from the descent again, because a mesh without rounds can miss a bound that another one of its size meets.
         let mut smallest: Option<MedialMesh> = None;
         loop {
-            let mut state = self.with(&meshes, smallest.as_ref(), wanted)?;
+            let count = wanted;
+            let mut state = self.with(&meshes, smallest.as_ref(), count)?;
             let now = (state.mesh.spheres.len(), state.error);
             // Trials far from the bound end early and cost little.
             trials += usize::from(!is_far(bound, now.1));
@@ -753,9 +754,11 @@ impl Within<'_> {
                 }
                 (None, None) => break,
             };
+            // No collapse is left that keeps the homotopy type: fewer spheres are out of reach.
+            let is_last = now.0 > count;
             let is_enough = |(spheres, _)| {
                 let is_close = missed.is_some_and(|(few, _)| spheres as f64 <= APART * few as f64);
-                wanted == 0 || is_close || trials >= TRIALS
+                wanted == 0 || is_last || is_close || trials >= TRIALS
             };
             if held.is_some_and(is_enough) {
                 break;

@@ -260,7 +260,8 @@ fn a_bound_is_held_by_the_judge_and_with_fewer_spheres_if_it_is_wider() {
     let mut levels = tight.prepare(&shape, &params, &RunContext::default()).unwrap();
     let judge = shape.judge(None, Default::default()).unwrap();
     let mut spheres = usize::MAX;
-    for bound in [0.015, 0.04] {
+    // The last one is far above the error of the fewest spheres that keep the tunnel.
+    for bound in [0.015, 0.04, 0.6] {
         let found = levels.at(Level::Native(bound)).unwrap();
         let certificate = judge.certify(&found.mesh, 1e-3).unwrap();
         assert!(certificate.lower <= bound, "{certificate:?} with {bound}");

@@ -33,7 +33,8 @@
 //! threads.
 //!
 //! Rounding: all of this is double precision, whose errors, at coordinates of the order of the
-//! surface's diagonal, are below [`ROUNDING`] diagonals. The interval is wider by that on both sides.
+//! surface's diagonal, are below [`ROUNDING`] diagonals. The interval is wider by that on both sides. Gaps between
+//! primitives that are narrower than [`BURIAL`](super::pieces::BURIAL) count as none.
 
 use super::ascent::Peak;
 use super::bounds::{Bound, Largest, Pieces, ROUNDING, check_tolerance};
@@ -75,7 +76,7 @@ pub fn certify(
         return Err(MetricError::NoArea);
     }
     let union = MedialUnion::new(mesh)?;
-    let boundary = Boundary::new(&union, Patches::new(mesh, Vec3::AXES), 1.0);
+    let boundary = Boundary::new(&union, Patches::new(mesh, Vec3::AXES, 1.0));
     // Both ends are widened by ROUNDING below; half of one more covers the rounding of these sums.
     let goal = tolerance - 2.5 * ROUNDING;
     // A good lower bound before the first piece is divided: the maximum is often at a vertex.
@@ -219,9 +220,9 @@ impl Pieces for SurfaceSide<'_> {
                 return Bound { reached, at: centre, upper: above.max(enough.min(to_outside)) };
             }
         }
-        if depth.upper - depth.lower > DOUBT * reach.max(self.goal) {
-            let doubt = 0.5 * DOUBT * reach.max(self.goal);
-            depth = self.boundary.within(centre, depth, doubt, left);
+        let doubt = DOUBT * reach.max(self.goal);
+        if depth.upper - depth.lower > doubt {
+            depth = self.boundary.within(centre, depth, 0.5 * doubt, left);
         }
         *outside = depth.outside.or(*outside);
         Bound { reached: depth.lower, at: centre, upper: depth.upper + reach }
@@ -263,8 +264,7 @@ impl Pieces for UnionSide<'_> {
         if lipschitz <= enough && closest.distance <= known {
             return Bound::above(lipschitz);
         }
-        let (normals, count) = patches.normals(piece);
-        if patches.is_overtopped(piece, &normals[..count]) {
+        if patches.is_overtopped(piece) {
             return Bound::above(0.0);
         }
         let Some(deepest) = patches.unburied(union, piece, &enclosure, &mut 0) else {

@@ -436,9 +436,9 @@ impl<F: Fn(&mut Cube, f64) -> Bound + Sync> Cubes<F> {
 impl<F: Fn(&mut Cube, f64) -> Bound + Sync> Pieces for Cubes<F> {
     type Piece = Cube;
     type Near = ();
+    const RUN: usize = 16;
 
     fn near(&self) {}
-    const RUN: usize = 16;
 
     fn begin(&mut self, cubes: &[Cube], lower: f64) {
         // Once given up, a proof of zero is not resumed: the upper bound is positive by then.

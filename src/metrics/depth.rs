@@ -21,7 +21,7 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use super::ascent::Peak;
-use super::pieces::{BURIAL, EXPOSED, Enclosure, Patches, Piece};
+use super::pieces::{EXPOSED, Enclosure, Patches, Piece};
 use crate::Vec3;
 use crate::complex::{MedialUnion, NearestPrimitive};
 use crate::geometry::trees::{PointTree, in_morton_order};
@@ -64,8 +64,6 @@ impl Depth {
 pub(super) struct Boundary<'a> {
     pub union: &'a MedialUnion,
     pub patches: Patches<'a>,
-    /// Of the surface.
-    diameter: f64,
     /// How far outside points are that are found outside: narrower gaps count as none.
     margin: f64,
     samples: Option<(PointTree, &'a [Vec3])>,
@@ -74,10 +72,9 @@ pub(super) struct Boundary<'a> {
 }
 
 impl<'a> Boundary<'a> {
-    /// The boundary of the union of the primitives in `patches`, next to a surface of a diameter.
-    pub fn new(union: &'a MedialUnion, patches: Patches<'a>, diameter: f64) -> Self {
-        let margin = BURIAL * diameter;
-        Self { union, patches, diameter, margin, samples: None, initial: OnceLock::new() }
+    /// The boundary of the union of the primitives in `patches`.
+    pub fn new(union: &'a MedialUnion, patches: Patches<'a>) -> Self {
+        Self { margin: patches.gap(), union, patches, samples: None, initial: OnceLock::new() }
     }
 
     /// Whether the bounds agree up to the width of gaps that count as none.
@@ -169,6 +166,11 @@ impl<'a> Boundary<'a> {
     /// The depth of `p` in an interval no wider than `tolerance`, from an interval that is known. The interval may be
     /// wider once no piece is `left`, from which those of this search are taken.
     pub fn within(&self, p: Vec3, known: Depth, tolerance: f64, left: &mut usize) -> Depth {
+        if *left == 0 {
+            return known;
+        }
+        // Points outside are a margin off the boundary, and no search lowers the upper bound below that.
+        let tolerance = tolerance.max(3.0 * self.margin);
         let mut depth = known;
         let (mut heap, mut near, mut parts, mut count) = (BinaryHeap::new(), 0, Vec::new(), 0);
         for &(piece, centre, reach) in self.initial() {
@@ -192,8 +194,7 @@ impl<'a> Boundary<'a> {
                 return depth;
             }
             parts.clear();
-            let (normals, count) = self.patches.normals(&open.piece);
-            if self.patches.is_overtopped(&open.piece, &normals[..count]) {
+            if self.patches.is_overtopped(&open.piece) {
                 continue;
             }
             let enclosure = self.patches.enclose(&open.piece);
@@ -208,8 +209,8 @@ impl<'a> Boundary<'a> {
             }
             self.patches.divide(&open.piece, &mut parts);
         }
-        // No piece is nearer than the point outside.
-        depth.lower = if depth.outside.is_some() { depth.upper } else { depth.lower };
+        // No piece is nearer than the upper bound.
+        depth.lower = if depth.upper.is_finite() { depth.upper } else { depth.lower };
         depth
     }
 
@@ -254,7 +255,7 @@ impl<'a> Boundary<'a> {
                 // Samples may lie on the boundary by rounding only: their distance is no proof.
                 depth.upper = depth.upper.min(peak.distance * (1.0 + SHARE) + self.margin);
                 // Without a point outside, the bound is infinite.
-                let tolerance = SHARE * depth.upper.min(self.diameter);
+                let tolerance = SHARE * depth.upper.min(self.patches.diameter);
                 depth = self.within(peak.point, depth, tolerance, &mut left);
             }
             if depth.lower > most {

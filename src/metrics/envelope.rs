@@ -169,6 +169,7 @@ enum Surface {
     Sphere(Sphere),
     /// Start sphere, end sphere, frame.
     Lateral(Sphere, Sphere, ConeFrame),
+    /// Corners, outward unit normal.
     Triangle([Vec3; 3], Vec3),
 }
 

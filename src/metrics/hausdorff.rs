@@ -93,8 +93,8 @@ pub(super) fn distances_with_envelope(
     options: &DistanceOptions,
 ) -> Result<(Distances, Envelope), MetricError> {
     let pose = &samples.pose;
-    let patches = Patches::new(mesh, pose.axes());
-    let mut boundary = Boundary::new(union, patches, pose.diameter());
+    let patches = Patches::new(mesh, pose.axes(), pose.diameter());
+    let mut boundary = Boundary::new(union, patches);
     let (depths, mu): (Vec<_>, Vec<_>) = boundary.readings(&samples.points).into_iter().unzip();
     let envelope = EnvelopeOptions {
         samples: options.envelope_samples,

@@ -68,7 +68,7 @@ impl<'a> PeakSearch<'a> {
         let Self { surface, tree, samples, options } = self;
         let (mesh, union) = samples.ordered(mesh)?;
         let pose = &samples.pose;
-        let mut boundary = Boundary::new(&union, Patches::new(&mesh, pose.axes()), pose.diameter());
+        let mut boundary = Boundary::new(&union, Patches::new(&mesh, pose.axes(), pose.diameter()));
         let envelope = EnvelopeOptions {
             samples: options.envelope_samples,
             burial: BURIAL * pose.diameter(),

@@ -123,6 +123,8 @@ pub(super) struct Patches<'a> {
     pub frames: Vec<Option<ConeFrame>>,
     /// The axes of the octants that spheres are divided into.
     axes: [Vec3; 3],
+    /// Of the surface.
+    pub diameter: f64,
     /// For each sphere the other ends of its edges, and for each edge the third corners of its faces.
     neighbours: [Vec<Vec<Sphere>>; 2],
 }
@@ -161,7 +163,7 @@ pub(super) struct Enclosure {
 
 impl<'a> Patches<'a> {
     /// Divisions follow the axes, so that they turn with the shape where the axes do.
-    pub fn new(mesh: &'a MedialMesh, axes: [Vec3; 3]) -> Self {
+    pub fn new(mesh: &'a MedialMesh, axes: [Vec3; 3], diameter: f64) -> Self {
         let hulls = Hulls::new(mesh);
         let frame = |cone: &Cone| {
             cone.frame().map(|frame| {
@@ -170,7 +172,12 @@ impl<'a> Patches<'a> {
             })
         };
         let frames = hulls.cones.iter().map(frame).collect();
-        Self { mesh, hulls, frames, axes, neighbours: neighbours(mesh) }
+        Self { mesh, hulls, frames, axes, diameter, neighbours: neighbours(mesh) }
+    }
+
+    /// Width of gaps that count as none.
+    pub fn gap(&self) -> f64 {
+        BURIAL * self.diameter
     }
 
     /// The initial pieces. Laterals are cut where a face begins or ends to overtop them.
@@ -204,7 +211,7 @@ impl<'a> Patches<'a> {
             cuts.sort_by(f64::total_cmp);
             for sector in cuts.windows(2) {
                 let piece = Piece::Lateral(edge, [0.0, 1.0], [sector[0], sector[1]]);
-                if !self.is_overtopped(&piece, &[normal(0.5 * (sector[0] + sector[1]))]) {
+                if !self.is_overtopped_along(&piece, &[normal(0.5 * (sector[0] + sector[1]))]) {
                     pieces.push(piece);
                 }
             }
@@ -237,7 +244,13 @@ impl<'a> Patches<'a> {
 
     /// Whether another sphere reaches farther in the direction of each normal of a curved piece. Then the primitive of both
     /// contains it: a point of a sphere is on the surface of no hull that reaches farther in the direction of its normal.
-    pub fn is_overtopped(&self, piece: &Piece, normals: &[Vec3]) -> bool {
+    pub fn is_overtopped(&self, piece: &Piece) -> bool {
+        let (normals, count) = self.normals(piece);
+        self.is_overtopped_along(piece, &normals[..count])
+    }
+
+    /// As [`is_overtopped`](Self::is_overtopped), in these directions alone.
+    pub fn is_overtopped_along(&self, piece: &Piece, normals: &[Vec3]) -> bool {
         self.others(piece).any(|other| normals.iter().all(|&n| other.height(n) > EXPOSED))
     }
 
@@ -291,7 +304,7 @@ impl<'a> Patches<'a> {
     /// The primitive that is deepest in the middle of a piece, searched from that at `near`; `None` where one contains
     /// the whole piece.
     ///
-    /// Tried for the piece moved outward by [`BURIAL`] before: a wall between primitives that touch is inside their
+    /// Tried for the piece moved outward by the width of a gap before: a wall between primitives that touch is inside their
     /// union, although each of its points is on the surface of both. The piece that is not moved is tried where that
     /// differs, since next to the wall a moved piece may cross from one primitive to the other.
     pub fn unburied(
@@ -308,8 +321,8 @@ impl<'a> Patches<'a> {
             let is_buried = self.hulls.bury(deepest, reach, &corners[..enclosure.count]);
             (!is_buried).then_some(deepest)
         };
-        let moved = deepest_at(BURIAL * self.normal(piece))?;
-        if moved.signed >= BURIAL - EXPOSED {
+        let moved = deepest_at(self.gap() * self.normal(piece))?;
+        if moved.signed >= self.gap() - EXPOSED {
             return Some(moved);
         }
         let deepest = deepest_at(Vec3::ZERO)?;

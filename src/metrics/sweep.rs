@@ -243,8 +243,7 @@ impl Surface for SweptUnion<'_> {
     type Piece = Hinted;
 
     fn bound(&self, (piece, hint): &mut Hinted, enough: f64, near: &mut Near) -> Option<Bound> {
-        let (normals, count) = self.patches.normals(piece);
-        if self.patches.is_overtopped(piece, &normals[..count]) {
+        if self.patches.is_overtopped(piece) {
             return None;
         }
         let enclosure = self.patches.enclose(piece);
@@ -252,7 +251,7 @@ impl Surface for SweptUnion<'_> {
         let reach = enclosure.reach();
         if let Piece::Round(_, [a, b, c]) = *piece
             && reach > COARSE * enough
-            && self.patches.is_overtopped(piece, &[(a + b + c).normalize()])
+            && self.patches.is_overtopped_along(piece, &[(a + b + c).normalize()])
         {
             // Too large for a bound by its distance, and buried.
             return Some(Bound::above(f64::INFINITY));
