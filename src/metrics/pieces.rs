@@ -11,7 +11,7 @@ use crate::geometry::planar_frame::PlanarFrame;
 use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
 use crate::surface::TriMesh;
 
-/// The primitives as whole convex bodies, unlike the parts of a [`MedialUnion`](crate::complex::MedialUnion).
+/// The primitives as whole convex bodies, unlike the parts of a [`MedialUnion`].
 pub(super) struct Hulls {
     spheres: Vec<Sphere>,
     cones: Vec<Cone>,
