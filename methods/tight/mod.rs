@@ -649,7 +649,7 @@ const MORE: f64 = 1.3;
 const GROWTH: [f64; 2] = [1.15, 1.6];
 
 /// Smallest and largest share of a count within the bound that the next count has.
-const SHARES: [f64; 2] = [0.35, 0.92];
+const SHARES: [f64; 2] = [0.35, 0.87];
 
 /// Range of errors that swaps and rounds can bring to the bound, in bounds.
 const NEAR: [f64; 2] = [0.5, WATCHED];
@@ -667,8 +667,8 @@ const APART: f64 = 1.15;
 
 /// Measured error that is aimed at, as a share of the bound.
 const AIM: f64 = 0.97;
-/// Width of the certificate, as a share of the bound.
-const WIDTH: f64 = 0.01;
+/// Width of the certificate, as a share of the bound, and of what the error leaves of it: the narrower, the slower.
+const WIDTHS: [f64; 2] = [0.01, 0.1];
 /// Smallest bound, a fraction of the diagonal. No number of spheres in reach keeps a smaller one.
 const LEAST: f64 = 1e-5;
 
@@ -704,8 +704,8 @@ impl Within<'_> {
         // The state, and the count and measured error of it and of the largest count that missed the bound.
         let (mut within, mut held, mut missed) = (None, None, None::<(usize, f64)>);
         let (mut trials, mut misses) = (0, 0);
-        // The mesh of fewest spheres far within the bound: the next trials continue from it. After a miss they start
-        // from the descent again, because a mesh without rounds can miss a bound that another one of its size meets.
+        // The mesh of fewest spheres within the bound: the next trials continue from it. Without rounds, far within the
+        // bound, it does so up to the first miss: it can miss a bound that another mesh of its size meets.
         let mut smallest: Option<MedialMesh> = None;
         loop {
             let count = wanted;
@@ -714,12 +714,13 @@ impl Within<'_> {
             // Trials far from the bound end early and cost little.
             trials += usize::from(!is_far(bound, now.1));
             if state.error <= bound {
-                state.error = self.goal.certified(&state.mesh, WIDTH * bound)?;
+                let width = (WIDTHS[0] * bound).max(WIDTHS[1] * (bound - state.error));
+                state.error = self.goal.certified(&state.mesh, width)?;
             }
             least = least.min(state.error);
             if state.error <= bound {
                 if held.is_none_or(|(spheres, _)| now.0 < spheres) {
-                    if missed.is_none() && is_far(bound, now.1) {
+                    if missed.is_none() || !is_far(bound, now.1) {
                         smallest = Some(state.mesh.clone());
                     }
                     (within, held) = (Some(state), Some(now));
@@ -727,7 +728,9 @@ impl Within<'_> {
                 misses = 0;
             } else if missed.is_none_or(|(spheres, _)| spheres < now.0) {
                 missed = Some((now.0, now.1.max(state.error)));
-                smallest = None;
+                if held.is_some_and(|(_, error)| is_far(bound, error)) {
+                    smallest = None;
+                }
                 misses += 1;
             }
             wanted = match (held, missed) {
