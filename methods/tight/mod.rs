@@ -667,8 +667,10 @@ const APART: f64 = 1.15;
 
 /// Measured error that is aimed at, as a share of the bound.
 const AIM: f64 = 0.97;
-/// Width of the certificate, as a share of the bound, and of what the error leaves of it: the narrower, the slower.
-const WIDTHS: [f64; 2] = [0.01, 0.1];
+/// Width of the certificate, as a share of what the measured error leaves of the bound.
+const WIDTH: f64 = 0.2;
+/// Smallest and largest width of the certificate, in bounds. The narrower, the slower.
+const WIDTHS: [f64; 2] = [0.002, 0.1];
 /// Smallest bound, a fraction of the diagonal. No number of spheres in reach keeps a smaller one.
 const LEAST: f64 = 1e-5;
 
@@ -704,34 +706,36 @@ impl Within<'_> {
         // The state, and the count and measured error of it and of the largest count that missed the bound.
         let (mut within, mut held, mut missed) = (None, None, None::<(usize, f64)>);
         let (mut trials, mut misses) = (0, 0);
-        // The mesh of fewest spheres within the bound: the next trials continue from it. Without rounds, far within the
-        // bound, it does so up to the first miss: it can miss a bound that another mesh of its size meets.
+        // The mesh of fewest spheres within the bound, up to the next miss: trials continue from it.
         let mut smallest: Option<MedialMesh> = None;
         loop {
             let count = wanted;
+            let is_continued = smallest.is_some();
             let mut state = self.with(&meshes, smallest.as_ref(), count)?;
             let now = (state.mesh.spheres.len(), state.error);
             // Trials far from the bound end early and cost little.
             trials += usize::from(!is_far(bound, now.1));
             if state.error <= bound {
-                let width = (WIDTHS[0] * bound).max(WIDTHS[1] * (bound - state.error));
+                let width = (WIDTH * (bound - state.error)).clamp(WIDTHS[0] * bound, WIDTHS[1] * bound);
                 state.error = self.goal.certified(&state.mesh, width)?;
             }
             least = least.min(state.error);
             if state.error <= bound {
                 if held.is_none_or(|(spheres, _)| now.0 < spheres) {
-                    if missed.is_none() || !is_far(bound, now.1) {
-                        smallest = Some(state.mesh.clone());
-                    }
+                    smallest = Some(state.mesh.clone());
                     (within, held) = (Some(state), Some(now));
                 }
                 misses = 0;
-            } else if missed.is_none_or(|(spheres, _)| spheres < now.0) {
-                missed = Some((now.0, now.1.max(state.error)));
-                if held.is_some_and(|(_, error)| is_far(bound, error)) {
-                    smallest = None;
+            } else {
+                smallest = None;
+                // From the descent, another mesh of as many spheres may hold the bound.
+                if is_continued && now.1 < RESCUED * bound && trials < TRIALS {
+                    continue;
                 }
-                misses += 1;
+                if missed.is_none_or(|(spheres, _)| spheres < now.0) {
+                    missed = Some((now.0, now.1.max(state.error)));
+                    misses += 1;
+                }
             }
             wanted = match (held, missed) {
                 (Some((many, _)), Some((few, _))) if many <= few + 1 => break,
@@ -744,11 +748,11 @@ impl Within<'_> {
                     } else {
                         between(held, missed, CLOSE * aim)
                     };
-                    wanted.min((SHARES[1] * many as f64) as usize).clamp(few + 1, many - 1)
+                    wanted.clamp(few + 1, many - 1)
                 }
                 (Some((spheres, error)), None) => {
                     let share = (error / aim).powf(RATE).clamp(SHARES[0], SHARES[1]);
-                    (spheres as f64 * share) as usize
+                    ((spheres as f64 * share).ceil() as usize).min(spheres - 1)
                 }
                 (None, Some((spheres, _))) if spheres >= finest => break,
                 (None, Some((spheres, error))) => {
