@@ -716,7 +716,8 @@ impl Within<'_> {
             // Trials far from the bound end early and cost little.
             trials += usize::from(!is_far(bound, now.1));
             if state.error <= bound {
-                let width = (WIDTH * (bound - state.error)).clamp(WIDTHS[0] * bound, WIDTHS[1] * bound);
+                let width =
+                    (WIDTH * (bound - state.error)).clamp(WIDTHS[0] * bound, WIDTHS[1] * bound);
                 state.error = self.goal.certified(&state.mesh, width)?;
             }
             least = least.min(state.error);

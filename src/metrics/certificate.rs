@@ -44,6 +44,7 @@ use super::evaluation::{Certificate, Witness, WitnessSide};
 use super::pieces::{
     EXPOSED, Patches, Piece, farthest, largest_distance, planar_frames, quartered,
 };
+use super::samples::Pose;
 use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion, NearestPrimitive};
 use crate::geometry::planar_frame::PlanarFrame;
@@ -76,7 +77,8 @@ pub fn certify(
         return Err(MetricError::NoArea);
     }
     let union = MedialUnion::new(mesh)?;
-    let boundary = Boundary::new(&union, Patches::new(mesh, Vec3::AXES, 1.0));
+    let pose = Pose::new(surface);
+    let boundary = Boundary::new(&union, Patches::new(mesh, pose.axes(), pose.diameter()));
     // Both ends are widened by ROUNDING below; half of one more covers the rounding of these sums.
     let goal = tolerance - 2.5 * ROUNDING;
     // A good lower bound before the first piece is divided: the maximum is often at a vertex.

@@ -114,7 +114,8 @@ pub struct Fit {
     /// all and that of the nearest union; at least the misfit. 0 for conventions and factors, which are exact.
     pub uncertainty: f64,
     /// Whether the mesh has the wrong units without doubt: it fits with the similarity, to 1 % of the diagonal at the median
-    /// (5 % for conventions and factors), and its union comes at least twice as near to the surface.
+    /// (5 % for conventions and factors), its union comes at least twice as near to the surface, and no change of the
+    /// radii alone explains a scale between 0.5 and 2 as well.
     #[serde(skip)]
     pub is_needed: bool,
 }
@@ -259,7 +260,9 @@ impl Shape {
             // A larger scale brings the union of a few spheres nearer to the surface. A mesh in a corner of the
             // surface fits at any size.
             && (NEARER * mean(&normal) <= mean(&Similarity::IDENTITY)
-                || is_far && BOX.contains(&(boxes.scale / normal.scale)));
+                || is_far && BOX.contains(&(boxes.scale / normal.scale)))
+            // Radii with a margin look like other units, but their centres are in place.
+            && !(is_free && !is_far && surface.misfit_in_place(&spheres) <= misfit.max(CLOSE));
         Ok(Fit {
             similarity: surface.in_input_units(&normal),
             source,
@@ -440,6 +443,20 @@ impl Surface {
         spheres.par_iter().map(|s| self.residual(&similarity.sphere(s)).0).collect()
     }
 
+    /// The least misfit with the centres in place: after one factor for all radii, or one addition to them.
+    fn misfit_in_place(&self, spheres: &[Sphere]) -> f64 {
+        let radii: Vec<f64> = spheres.iter().map(|sphere| sphere.radius).collect();
+        let gaps = self.residuals(spheres, &Similarity::IDENTITY);
+        let added = middle(gaps.clone()).unwrap_or(0.0);
+        let shares = gaps.iter().zip(&radii).filter(|(_, radius)| **radius > 0.0);
+        let share = middle(shares.map(|(gap, radius)| gap / radius).collect()).unwrap_or(0.0);
+        let after = |change: &dyn Fn(f64) -> f64| {
+            let left: Vec<f64> = gaps.iter().zip(&radii).map(|(gap, r)| gap - change(*r)).collect();
+            median(&left).unwrap_or(0.0)
+        };
+        after(&|_| added).min(after(&|radius| share * radius))
+    }
+
     /// The mean of `|D(c) - r|` in the unit of the file. In that of the surface, spheres shrunk to one of its points would fit.
     fn mean(&self, spheres: &[Sphere], similarity: &Similarity) -> f64 {
         let sum: f64 = self.residuals(spheres, similarity).iter().map(|e| e.abs()).sum();
@@ -591,15 +608,19 @@ impl Similarity {
     }
 }
 
-/// The middle one of the absolute values, or the mean of the two in the middle.
+/// The median of the absolute values.
 fn median(values: &[f64]) -> Option<f64> {
-    let mut sizes: Vec<f64> = values.iter().map(|value| value.abs()).collect();
-    sizes.sort_unstable_by(f64::total_cmp);
-    let middle = sizes.len() / 2;
-    match sizes.len() % 2 {
-        _ if sizes.is_empty() => None,
-        1 => Some(sizes[middle]),
-        _ => Some((sizes[middle - 1] + sizes[middle]) / 2.0),
+    middle(values.iter().map(|value| value.abs()).collect())
+}
+
+/// The middle value, or the mean of the two in the middle.
+fn middle(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() % 2 {
+        _ if values.is_empty() => None,
+        1 => Some(values[middle]),
+        _ => Some((values[middle - 1] + values[middle]) / 2.0),
     }
 }
 
@@ -733,6 +754,23 @@ mod tests {
         assert!(shape.misfit(&initial).unwrap().unwrap() > 0.4);
         assert_eq!(shape.fit_if_needed(&initial).unwrap(), None);
         assert_eq!(shape.fit(&initial).unwrap().source, FitSource::Units);
+    }
+
+    /// Spheres that contain a bar with a margin: with a scale of 0.87 their radii would fit, and its ends be lost.
+    #[test]
+    fn a_margin_of_the_radii_is_no_change_of_units() {
+        let bar = cuboid(Vec3::ZERO, Vec3::new(10.0, 2.0, 2.0));
+        let report = validate(&bar).unwrap();
+        let shape = Shape::new("bar", &bar, report, ShapeOptions::default()).unwrap();
+        let row = |radius: f64| {
+            let spheres =
+                (2..=8).map(|i| Sphere::new(Vec3::new(f64::from(i) * 1.125, 1.0, 1.0), radius));
+            let edges = (0..6).map(|i| [i, i + 1]).collect();
+            MedialMesh::from_simplices(spheres.collect(), edges, vec![]).unwrap()
+        };
+        for radius in [1.15, 1.3] {
+            assert_eq!(shape.fit_if_needed(&row(radius)).unwrap(), None, "{radius}");
+        }
     }
 
     /// Spheres that are too large by 1.5 % of the diagonal, as after a coarse simplification.

@@ -109,13 +109,21 @@ pub(crate) fn header(bytes: &[u8]) -> Result<Ply<'_>, Fault> {
     let header = Parser::<Row>::new()
         .read_header(&mut reader)
         .map_err(|error| fault(Place::Line(error.line().unwrap_or(1)), "a PLY header", &error))?;
-    let mut names = HashSet::new();
+    // The parser keeps one of several with a name, and would take columns or rows of the others for its.
+    let (mut names, mut element) = (HashSet::new(), None);
     for (row, line) in (1..).zip(head.lines()) {
-        let name =
-            line.trim().strip_prefix("element").and_then(|rest| rest.split_whitespace().next());
-        // The parser keeps the last of several with one name, and would take rows of the first for its.
-        if let Some(name) = name.filter(|&name| !names.insert(name)) {
-            let expected = "elements of different names".to_owned();
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let (name, kind) = match words[..] {
+            ["element", name, ..] => {
+                element = Some(name);
+                ((None, name), "elements")
+            }
+            ["property", .., name] => ((element, name), "properties"),
+            _ => continue,
+        };
+        if !names.insert(name) {
+            let expected = format!("{kind} of different names");
+            let name = name.1;
             return Err(Fault::Syntax { at: Place::Line(row), expected, found: quoted(name) });
         }
     }

@@ -578,32 +578,38 @@ fn cavities_in_two_plates_are_certified() {
 }
 
 /// Two plates, one on the other, with a gap, without, and with an overlap: the wall between them is inside their union
-/// unless a gap is wider than 1e-7 of the diagonal.
+/// unless a gap is wider than 1e-7 of the diameter, whatever the diagonal of the bounding box of the turned block.
 #[test]
 fn walls_between_primitives_that_touch_are_no_boundary() {
-    let (mut surface, _) = cuboid(4.0, 4.0, 2.0);
-    surface.vertices.iter_mut().for_each(|v| *v /= 6.0);
-    let bvh = TriangleBvh::new(&surface).unwrap();
-    for overlap in [-1e-5, -1e-6, -3e-7, -1e-8, 0.0, 1e-12, 1e-9, 1e-7, 1e-4] {
-        let plate = |z: f64| {
-            [[0.5, 0.5], [3.5, 0.5], [3.5, 3.5], [0.5, 3.5]].map(|[x, y]| (Vec3::new(x, y, z), 0.5))
-        };
-        let spheres = [plate(0.5), plate(1.5 - overlap)].concat();
-        let mesh = complex(&spheres, &[], &[[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]);
-        let mesh = mesh.transformed(1.0 / 6.0, |p| p / 6.0);
-        // From the bottom of the notch around the plates, where their rims meet at an edge of the box, to its sides; from
-        // the middle of a gap to the ends of the box.
-        let half = (1.0 - overlap) / 2.0;
-        let notch = (0.5 - f64::sqrt((0.25 - half * half).max(0.0) / 2.0)) / 6.0;
-        let exact = if overlap < -6e-7 { 1.0 / 6.0 } else { notch };
-        let measured = measure(&surface, &mesh).hausdorff;
-        let share = measured / exact;
-        assert!((0.97..1.0 + 1e-6).contains(&share), "{share} of {exact}, overlap {overlap}");
-        let found = certify(&surface, &bvh, &mesh, 5e-3);
-        let found = found.unwrap_or_else(|error| panic!("overlap {overlap}: {error}"));
-        assert!((found.lower..=found.upper).contains(&exact), "{exact}: {found:?}, {overlap}");
-        assert!(measured <= found.upper && found.upper - found.lower <= 5e-3);
+    for overlap in [-1e-5, -1e-6, -7.5e-7, -3e-7, -1e-8, 0.0, 1e-12, 1e-9, 1e-7, 1e-4] {
+        walls_of_plates_that_overlap_by(overlap, 6.0);
     }
+    walls_of_plates_that_overlap_by(-7.5e-7, 9.0);
+}
+
+/// In a block with a diagonal of 6, divided by `size`.
+fn walls_of_plates_that_overlap_by(overlap: f64, size: f64) {
+    let (mut surface, _) = cuboid(4.0, 4.0, 2.0);
+    surface.vertices.iter_mut().for_each(|v| *v /= size);
+    let bvh = TriangleBvh::new(&surface).unwrap();
+    let plate = |z: f64| {
+        [[0.5, 0.5], [3.5, 0.5], [3.5, 3.5], [0.5, 3.5]].map(|[x, y]| (Vec3::new(x, y, z), 0.5))
+    };
+    let spheres = [plate(0.5), plate(1.5 - overlap)].concat();
+    let mesh = complex(&spheres, &[], &[[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]);
+    let mesh = mesh.transformed(1.0 / size, |p| p / size);
+    // From the bottom of the notch around the plates, where their rims meet at an edge of the box, to its sides; from
+    // the middle of a gap to the ends of the box.
+    let half = (1.0 - overlap) / 2.0;
+    let notch = (0.5 - f64::sqrt((0.25 - half * half).max(0.0) / 2.0)) / size;
+    let exact = if overlap < -6e-7 { 1.0 / size } else { notch };
+    let measured = measure(&surface, &mesh).hausdorff;
+    let share = measured / exact;
+    assert!((0.97..1.0 + 1e-6).contains(&share), "{share} of {exact}, overlap {overlap}");
+    let found = certify(&surface, &bvh, &mesh, 5e-3);
+    let found = found.unwrap_or_else(|error| panic!("overlap {overlap}: {error}"));
+    assert!((found.lower..=found.upper).contains(&exact), "{exact}: {found:?}, {overlap}");
+    assert!(measured <= found.upper && found.upper - found.lower <= 5e-3);
 }
 
 #[test]

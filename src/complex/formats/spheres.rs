@@ -444,23 +444,16 @@ fn has_key(document: &Value, key: &str) -> bool {
 fn collect(value: &Value, key: &str, links: &mut Vec<Link>) -> Result<(), String> {
     match value {
         Value::Array(items) if items.iter().any(has_centre) => {
-            let spheres = items.iter().enumerate().map(|(k, item)| {
-                sphere(item).map_err(|why| format!("{}, sphere {}: {why}", shortened(key), k + 1))
-            });
-            let spheres = spheres.collect::<Result<_, _>>()?;
-            links.push(Link { name: key.to_owned(), spheres, ..Link::default() });
+            let numbered =
+                items.iter().enumerate().map(|(k, item)| (format!("sphere {}", k + 1), item));
+            links.push(link_of(key, numbered)?);
             // Spheres of a hierarchy have others inside.
             items.iter().filter_map(Value::as_object).try_for_each(|map| named(map, key, links))
         }
         Value::Array(items) => {
             let unnamed = items.iter().position(|item| has_radius(item) && has_point(item));
             if let Some(k) = unnamed {
-                let names = CENTRES.join(", ");
-                let key = shortened(key);
-                return Err(format!(
-                    "{key}, sphere {}: none of the names of a center: {names}",
-                    k + 1
-                ));
+                return Err(format!("{}, sphere {}: {}", shortened(key), k + 1, no_centre()));
             }
             items.iter().try_for_each(|item| collect(item, key, links))
         }
@@ -469,16 +462,45 @@ fn collect(value: &Value, key: &str, links: &mut Vec<Link>) -> Result<(), String
     }
 }
 
-/// Adds the spheres that are values of an object, and the lists below it.
+/// Adds the spheres that are values of an object, and the lists below it. Next to a sphere, whatever is nearly one has to
+/// be one: it would be lost.
 fn named(map: &Map<String, Value>, key: &str, links: &mut Vec<Link>) -> Result<(), String> {
-    let spheres = map.iter().filter(|(_, item)| has_centre(item) && has_radius(item));
-    let spheres = spheres
-        .map(|(name, item)| sphere(item).map_err(|why| format!("{}: {why}", shortened(name))));
-    let spheres: Vec<Sphere> = spheres.collect::<Result<_, _>>()?;
-    if !spheres.is_empty() {
-        links.push(Link { name: key.to_owned(), spheres, ..Link::default() });
+    if map.values().any(|item| has_centre(item) && has_radius(item) && !is_other_shape(item)) {
+        let alike = map.iter().filter(|(_, item)| has_centre(item) || has_radius(item));
+        links.push(link_of(key, alike.map(|(name, item)| (shortened(name), item)))?);
     }
     map.iter().try_for_each(|(key, value)| collect(value, key, links))
+}
+
+/// The link of a list of spheres, each with its name in errors.
+fn link_of<'a>(
+    key: &str,
+    items: impl Iterator<Item = (String, &'a Value)>,
+) -> Result<Link, String> {
+    let mut link = Link { name: key.to_owned(), ..Link::default() };
+    for (name, item) in items {
+        if is_other_shape(item) {
+            link.others += 1;
+        } else {
+            let within = if key.is_empty() { String::new() } else { shortened(key) + ", " };
+            let read = sphere(item).map_err(|why| format!("{within}{name}: {why}"));
+            link.spheres.push(read?);
+        }
+    }
+    Ok(link)
+}
+
+/// Whether an item is a box, a cylinder or the like, by its type or its measures.
+fn is_other_shape(item: &Value) -> bool {
+    let of = |keys: &[&str]| keys.iter().find_map(|key| item.get(key));
+    match of(&["type", "shape"]).and_then(Value::as_str) {
+        Some(kind) => !kind.to_ascii_lowercase().contains("sphere"),
+        None => of(&["height", "length", "size", "dims", "dimensions", "extents"]).is_some(),
+    }
+}
+
+fn no_centre() -> String {
+    format!("none of the names of a center: {}", CENTRES.join(", "))
 }
 
 fn has_radius(item: &Value) -> bool {
@@ -505,8 +527,12 @@ fn sphere(item: &Value) -> Result<Sphere, String> {
         let number = value.as_f64().filter(|number| number.is_finite());
         number.ok_or_else(|| format!("the {field} {} is not a finite number", text(value)))
     };
+    let mut keys = item.as_object().into_iter().flat_map(Map::keys);
+    if let Some(key) = keys.find(|key| key.parse::<f64>().is_ok()) {
+        return Err(format!("the key {} is a number; write decimal points", quoted(key)));
+    }
     let mut centres = CENTRES.iter().filter_map(|key| item.get(key));
-    let centre = centres.next().ok_or("the center is missing")?;
+    let centre = centres.next().ok_or_else(no_centre)?;
     if centres.next().is_some() {
         return Err("two centers".to_owned());
     }
@@ -766,6 +792,11 @@ mod tests {
             ("x.xyzr", "2\n0 0 0 1\n1 0 0 2\n", &[1.0, 2.0]),
             ("x.txt", "1 0 0 0\nv 0 0 0 3\n", &[3.0]),
             ("x.json", "[{\"origin\": [0, 0, 0], \"radius\": 1}]", &[1.0]),
+            (
+                "x.json",
+                "[{\"center\": [0, 0, 0], \"radius\": 3}, {\"center\": [0, 0, 0], \"size\": [1, 1, 1]}]",
+                &[3.0],
+            ),
             ("x.json", "{\"link\": [{\"center\": [0, 0, 0], \"radius\": 2}], \"n\": 3}", &[2.0]),
             ("x.urdf", urdf, &[2.0]),
             ("x.xml", urdf, &[2.0]),
@@ -865,6 +896,7 @@ x.xyzr => 0 0 0 1\n0 0 1 inf\n => , line 2: the r "inf" is not
 x.csv => x,y,z,r,g,b\n0,0,0,255,1,1\n => , line 1: no column r (found "x,y,z,r,g,b"
 x.csv => x,y,z,r,green,blue\n0,0,0,255,1,1\n => , line 1: no column r (found "x,y,z,r,green,blue"
 x.ply => ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nproperty uchar r\nproperty uchar green\nproperty uchar blue\nend_header\n0 0 0 255 1 1\n => : element vertex has no property radius
+x.ply => ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float x\nproperty float y\nend_header\n0 7 0\n => : line 5: expected properties of different names, found "x"
 x.ply => ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nelement vertex 1\nproperty float x\nend_header\n0\n0\n => : line 5: expected elements of different names, found "vertex"
 x.csv => x,y,z,r,radius\n0,0,0,5,1\n => , line 1: two columns of radii, r and radius
 x.csv => x,y,z,r,x\n0,0,0,5,1\n => , line 1: two columns x (found
@@ -877,7 +909,11 @@ x.json => {"a": {"center": [0, 0, 0], "r": 1}} => : a: the radius is missing
 x.json =>  => , line 1: EOF
 x.json => {"a": [{"center": [0, 0, 0], "radius": 1}], "b": [{"position": [0, 0, 0], "radius": 1}]} => : b, sphere 1: none of the names of a center
 x.json => [{"center": [0, 0, 0], "radius": 1, "children": [{"center": [0, 0, 0], "radius": 1}]}] => : 2 links (
-x.json => [{"center": [0, 0, 0], "origin": [1, 0, 0], "radius": 1}] => : , sphere 1: two centers
+x.json => [{"center": [0, 0, 0], "origin": [1, 0, 0], "radius": 1}] => : sphere 1: two centers
+x.json => {"a": {"center": [0, 0, 0], "radius": 1}, "b": {"position": [1, 0, 0], "radius": 1}} => : b: none of the names
+x.json => {"a": {"center": [0, 0, 0], "radius": 1}, "b": {"center": [1, 0, 0], "Radius": 1}} => : b: the radius is missing
+x.json => [{"type": "cylinder", "center": [0, 0, 0], "radius": 1, "height": 2}] => : no spheres (found 1 other shapes)
+x.yaml => s:\n  - {center: [0, 0, 0], radius: 0,5} => : s, sphere 1: the key "5" is a number; write decimal points
 x.json => {\n] => , line 2:
 x.json => {"a": []} => : no spheres
 x.json => 3 => : no spheres
