@@ -648,8 +648,8 @@ const MORE: f64 = 1.3;
 /// Smallest and largest factor of the count after a miss.
 const GROWTH: [f64; 2] = [1.15, 1.6];
 
-/// Smallest and largest share of a count within the bound that the next count has.
-const SHARES: [f64; 2] = [0.35, 0.87];
+/// Smallest share of a count within the bound that the next count has.
+const SHARE: f64 = 0.35;
 
 /// Range of errors that swaps and rounds can bring to the bound, in bounds.
 const NEAR: [f64; 2] = [0.5, WATCHED];
@@ -662,7 +662,7 @@ const CLOSE: f64 = 0.97;
 
 /// Limit of the tried counts once one is within the bound.
 const TRIALS: usize = 4;
-/// Ratio of a count within the bound to the largest miss, up to which no count between them is tried.
+/// Ratio of a count within the bound to the one above the largest miss, up to which none between them is tried.
 const APART: f64 = 1.15;
 
 /// Measured error that is aimed at, as a share of the bound.
@@ -752,8 +752,9 @@ impl Within<'_> {
                     wanted.clamp(few + 1, many - 1)
                 }
                 (Some((spheres, error)), None) => {
-                    let share = (error / aim).powf(RATE).clamp(SHARES[0], SHARES[1]);
-                    ((spheres as f64 * share).ceil() as usize).min(spheres - 1)
+                    let share = (error / aim).powf(RATE).max(SHARE);
+                    let most = (spheres as f64 / APART).ceil() as usize - 1;
+                    ((spheres as f64 * share) as usize).min(most)
                 }
                 (None, Some((spheres, _))) if spheres >= finest => break,
                 (None, Some((spheres, error))) => {
@@ -765,7 +766,8 @@ impl Within<'_> {
             // No collapse is left that keeps the homotopy type: fewer spheres are out of reach.
             let is_last = now.0 > count;
             let is_enough = |(spheres, _)| {
-                let is_close = missed.is_some_and(|(few, _)| spheres as f64 <= APART * few as f64);
+                let is_close =
+                    missed.is_some_and(|(few, _)| spheres as f64 <= APART * (few + 1) as f64);
                 wanted == 0 || is_last || is_close || trials >= TRIALS
             };
             if held.is_some_and(is_enough) {
