@@ -475,16 +475,16 @@ pub const METRICS: &[Metric] = &[
         .neutral(),
     count("stored_bytes", "stored bytes", |e| Some(e.counts.bytes() as f64)),
     length("axis_computed_to_true_max", "to the true axis, max", |e| {
-        Some(e.axis.as_ref()?.in_space.computed_to_true_max)
+        Some(e.axis?.computed_to_true_max)
     }),
     length("axis_computed_to_true_mean", "to the true axis, mean", |e| {
-        Some(e.axis.as_ref()?.in_space.computed_to_true_mean)
+        Some(e.axis?.computed_to_true_mean)
     }),
     length("axis_true_to_computed_max", "from the true axis, max", |e| {
-        Some(e.axis.as_ref()?.in_space.true_to_computed_max)
+        Some(e.axis?.true_to_computed_max)
     }),
     length("axis_true_to_computed_mean", "from the true axis, mean", |e| {
-        Some(e.axis.as_ref()?.in_space.true_to_computed_mean)
+        Some(e.axis?.true_to_computed_mean)
     }),
     SHEETS_MATCHED,
     CONTACTS_RIGHT,

@@ -256,8 +256,7 @@ fn print_evaluation(evaluation: &Evaluation) {
     if let Some(structure) = &evaluation.structure {
         print_line(&format!("  {:<32} {}", "structure", structure.graph));
         if let Some(known) = &structure.known {
-            let (matched, missing, spurious) =
-                (known.matched.len(), known.missing.len(), known.spurious.len());
+            let (matched, missing, spurious) = (known.matched, known.missing, known.spurious);
             let text = format!("{matched} matched, {missing} missing, {spurious} spurious");
             print_line(&format!("  {:<32} {text}", "sheets compared"));
         }

@@ -53,7 +53,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let Arguments { fill_holes, separate, .. } = *arguments;
     let options = MendOptions { fill_holes, separate, components };
     // An error unless the repaired surface bounds a solid.
-    let repaired = surface::mend(&arguments.input, options).map_err(Failure::input)?;
+    let inspected = surface::inspect(&arguments.input);
+    let repaired = inspected.and_then(|found| found.mend(options)).map_err(Failure::input)?;
     surface::write(&arguments.output, &repaired.mesh).map_err(Failure::input)?;
     let report = repaired.report;
     let object = json!({

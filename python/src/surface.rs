@@ -7,8 +7,8 @@ use medial::complex::{DualTriangulation, MedialMesh};
 use medial::metrics::{Judge, JudgeOptions};
 use medial::shape::{Shape, ShapeOptions};
 use medial::surface::{
-    self, Components, Format, InsideTest, Loaded, MendOptions, Normalisation, Sampling,
-    SignedDistance, SurfaceReport, TriMesh, TriangleBvh,
+    self, Components, InsideTest, Loaded, MendOptions, Normalisation, Sampling, SignedDistance,
+    SurfaceError, SurfaceReport, TriMesh, TriangleBvh,
 };
 use medial_run::input::{Input, Source};
 use numpy::{PyArray1, PyReadonlyArray2};
@@ -175,9 +175,12 @@ impl Surface {
         long(py, &call, move |_, monitor| {
             monitor.at("repairing");
             let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            // Arrays come as the text of a file that has no name.
             let loaded = match off {
-                Some(text) => surface::mend_bytes(&text, Format::Off, options)?,
-                None => surface::mend(&path, options)?,
+                Some(text) => surface::inspect_bytes("mesh.off", &text)
+                    .and_then(|found| found.mend(options))
+                    .map_err(|error| SurfaceError { file: None, ..error })?,
+                None => surface::inspect(&path)?.mend(options)?,
             };
             Ok(Self::new(name.unwrap_or(stem), loaded, None))
         })

@@ -145,7 +145,7 @@ while IFS='|' read -r metric oracle input; do
     say "$metric" "$oracle" "$input" "cargo test" "in the test suite"
 done <<'END'
 distance to cone and slab|brute force over interpolated spheres|tests/it/signed_distance.rs: all degenerate classes
-distance to the true axis, coverage|closed forms|tests/it/metric_distances.rs: box, segments, shifted axes
+distance to the true axis|closed forms|src/metrics/axis_distance.rs: segments, shifted axes
 certified interval|exact distances|src/metrics/certificate/tests.rs: spheres, cones, slabs in boxes and spheres
 distance between surfaces|closed forms, brute force|tests/it/surface_distance.rs: boxes, random soups
 spike measures|a flood from the boundary|src/metrics/spikes_tests.rs: random complexes

@@ -224,22 +224,9 @@ impl Counts {
     }
 }
 
-/// Distances between a computed medial axis and the true one.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AxisDistances {
-    /// As sets of points in space.
-    #[serde(flatten)]
-    pub in_space: AxisSpan,
-    /// As sets of points with radii, in four-dimensional space.
-    pub with_radius: AxisSpan,
-    /// For each sheet of the true axis how much of it the computed axis covers; the largest sheet
-    /// first.
-    pub coverage: Vec<SheetCoverage>,
-}
-
-/// Distances between two axes, both ways.
+/// Distances between a computed medial axis and the true one, as sets of points in space.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AxisSpan {
+pub struct AxisDistances {
     /// Largest distance from the computed axis to the true one.
     pub computed_to_true_max: f64,
     /// Mean of the same.
@@ -248,15 +235,6 @@ pub struct AxisSpan {
     pub true_to_computed_max: f64,
     /// Mean of the same.
     pub true_to_computed_mean: f64,
-}
-
-/// How much of one sheet of the true axis is covered.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SheetCoverage {
-    /// Area of the sheet.
-    pub area: f64,
-    /// Share of it that is covered; `None` where no sample fell on it.
-    pub covered: Option<f64>,
 }
 
 /// An interval that holds the Hausdorff distance between a surface and the boundary of a union.
@@ -326,14 +304,12 @@ pub struct Structure {
 }
 
 /// Sizes of a sheet graph.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GraphSizes {
     /// Number of sheets.
     pub sheets: u64,
     /// Their total area.
     pub sheet_area: f64,
-    /// Areas of the largest sheets, at most 32.
-    pub areas: Vec<f64>,
     /// Number of pieces that are too narrow to be sheets.
     pub small_pieces: u64,
     /// Their area.
@@ -348,12 +324,8 @@ pub struct GraphSizes {
     pub seams_of_three: Option<f64>,
     /// Number of curves.
     pub curves: u64,
-    /// Their total length.
-    pub curve_length: f64,
     /// Number of junctions.
     pub junctions: u64,
-    /// Length at which sheets end.
-    pub boundary_length: f64,
 }
 
 impl fmt::Display for GraphSizes {
@@ -418,44 +390,26 @@ impl ContactTable {
 /// How central samples of sheets and curves are; absent where there are none inside.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Centrality {
-    /// Mean difference of the distances to the two contacts.
-    pub mean: Option<f64>,
-    /// 95th percentile of the same.
+    /// 95th percentile of the difference of the distances to the two contacts.
     pub p95: Option<f64>,
-    /// Mean angle between a sheet's normal and the chord of the contacts, in degrees.
-    pub angle_mean: Option<f64>,
-    /// 95th percentile of the same.
-    pub angle_p95: Option<f64>,
 }
 
 /// Sharp features of the surface, and the shares of them that the medial mesh reaches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Features {
-    /// Length of the sharp convex edges.
-    pub convex_length: f64,
-    /// Share of it that is reached.
+    /// Share of the length of the sharp convex edges that is reached.
     pub convex_reached: Option<f64>,
-    /// Length of the sharp concave edges.
-    pub concave_length: f64,
-    /// Share of it that is reached, which is an error.
+    /// Share of the length of the sharp concave edges that is reached, which is an error.
     pub concave_reached: Option<f64>,
-    /// Vertices with three or more sharp edges, all convex.
-    pub corners: u32,
-    /// Share of them that is reached.
-    pub corners_reached: Option<f64>,
 }
 
 /// Distances from the medial balls of surface points to the medial mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Completeness {
-    /// Number of balls.
-    pub balls: u32,
-    /// Share of their centres within [`REACHED`](super::REACHED).
+    /// Share of the centres within [`REACHED`](super::REACHED).
     pub found: Option<f64>,
     /// 95th percentile of the distances.
     pub p95: Option<f64>,
-    /// 95th percentile of the difference of the radii there.
-    pub radius_p95: Option<f64>,
 }
 
 /// Parts of a medial mesh outside of the solid.
@@ -478,24 +432,15 @@ pub(super) fn share(part: u32, all: u32) -> Option<f64> {
     (all > 0).then(|| f64::from(part) / f64::from(all))
 }
 
-/// A sheet and its partner.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SheetPair {
-    /// Areas in the first and in the second medial mesh.
-    pub areas: [f64; 2],
-    /// Share of the first sheet that is near the second one, and of the second near the first.
-    pub overlap: [f64; 2],
-}
-
 /// Sheets of two medial meshes of one solid, matched where most of each is nearest to the other.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SheetDifference {
-    /// Matched sheets, the largest of the second mesh first.
-    pub matched: Vec<SheetPair>,
-    /// Areas of sheets of the first mesh without a partner, descending.
-    pub spurious: Vec<f64>,
-    /// Areas of sheets of the second mesh without a partner, descending.
-    pub missing: Vec<f64>,
+    /// Number of pairs of matched sheets.
+    pub matched: usize,
+    /// Number of sheets of the first mesh without a partner.
+    pub spurious: usize,
+    /// Number of sheets of the second mesh without a partner.
+    pub missing: usize,
     /// Share of the first mesh's sheet area that is spurious.
     pub spurious_share: Option<f64>,
     /// Share of the second mesh's sheet area that is missing.

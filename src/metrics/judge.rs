@@ -2,16 +2,13 @@
 
 use std::sync::Arc;
 
-use super::axis_distance::{AxisOptions, PreparedAxis, prepared_axis_distance};
+use super::axis_distance::PreparedAxis;
 use super::bounds::ROUNDING;
 use super::certificate::certify;
 use super::cover::CoverTest;
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::error::MetricError;
-use super::evaluation::{
-    AxisDistances, Certificate, Cover, Distances, Evaluation, MeanAndP95, SheetDifference,
-    Structure,
-};
+use super::evaluation::{Certificate, Cover, Distances, Evaluation, MeanAndP95, SheetDifference};
 use super::hausdorff::{DistanceOptions, distances_with_envelope};
 use super::quality::{counts, triangle_quality};
 use super::samples::{Pose, SurfaceSamples};
@@ -109,6 +106,7 @@ impl Judge {
         let samples = self.samples()?;
         let (mesh, union) = &samples.ordered(mesh)?;
         let options = self.distance_options();
+        let prepared = &PreparedAxis::new(mesh)?;
         // In parallel with each other, because each has serial parts.
         let ((distances, volumes), (axis, (quality, spikes, betti, structure))) = rayon::join(
             || {
@@ -127,10 +125,19 @@ impl Judge {
             },
             || {
                 rayon::join(
-                    || self.true_axis.as_ref().map(|truth| self.axis_distances(mesh, truth)),
+                    || {
+                        let truth = self.true_axis.as_ref()?;
+                        let truth = truth.as_ref().map_err(Clone::clone);
+                        let JudgeOptions { samples, seed, .. } = self.options;
+                        Some(truth.and_then(|truth| prepared.distances(truth, samples, seed)))
+                    },
                     || {
                         let betti = betti(mesh);
-                        (triangle_quality(mesh), spikes(mesh), betti, self.structure(mesh, betti))
+                        let cavities = self.truth.betti.map_or(0, |betti| betti[2]);
+                        let pockets = betti[2].saturating_sub(cavities);
+                        let known = self.truth.axis.as_ref();
+                        let structure = self.structure.measure(mesh, prepared, pockets, known);
+                        (triangle_quality(mesh), spikes(mesh), betti, structure)
                     },
                 )
             },
@@ -167,7 +174,7 @@ impl Judge {
             expected_betti: self.truth.betti,
             counts: counts(mesh),
             axis,
-            structure: Some(structure?).filter(|_| is_connected),
+            structure: Some(structure).filter(|_| is_connected),
             diagonal: self.truth.diagonal,
             seed: self.options.seed,
         })
@@ -293,23 +300,6 @@ impl Judge {
         };
         let bounds = box_in(pose, &self.surface, &mesh.spheres);
         volumes_in(pose, bounds, &sides, &options).map(Some)
-    }
-
-    fn structure(&self, mesh: &MedialMesh, betti: [u64; 3]) -> Result<Structure, MetricError> {
-        let cavities = self.truth.betti.map_or(0, |betti| betti[2]);
-        let pockets = betti[2].saturating_sub(cavities);
-        let axis = PreparedAxis::new(mesh)?;
-        Ok(self.structure.measure(mesh, &axis, pockets, self.truth.axis.as_ref()))
-    }
-
-    fn axis_distances(
-        &self,
-        mesh: &MedialMesh,
-        truth: &Result<PreparedAxis, MetricError>,
-    ) -> Result<AxisDistances, MetricError> {
-        let options = AxisOptions { samples: self.options.samples, seed: self.options.seed };
-        let truth = truth.as_ref().map_err(Clone::clone)?;
-        prepared_axis_distance(&PreparedAxis::new(mesh)?, truth, &options)
     }
 
     /// Signs that the medial mesh does not belong to this surface: some published files have wrong

@@ -28,17 +28,15 @@ mod union_topology;
 mod volume;
 
 pub use ascent::Peak;
-pub use axis_distance::{AxisOptions, COVERED, axis_distance};
 pub use bounds::{FINEST, ROUNDING};
 pub use certificate::certify;
 pub use cover::{CoverTest, SMALLEST};
 pub use envelope::{EnvelopeOptions, sample_envelope};
 pub use error::MetricError;
 pub use evaluation::{
-    AxisDistances, AxisSpan, Centrality, Certificate, Completeness, ContactTable, ContactType,
-    Counts, Cover, Distances, Evaluation, Features, GraphSizes, MeanAndP95, OneSided, Outside,
-    RatioSpikes, SheetCoverage, SheetDifference, SheetPair, Spikes, Structure, TriangleQuality,
-    Witness, WitnessSide,
+    AxisDistances, Centrality, Certificate, Completeness, ContactTable, ContactType, Counts, Cover,
+    Distances, Evaluation, Features, GraphSizes, MeanAndP95, OneSided, Outside, RatioSpikes,
+    SheetDifference, Spikes, Structure, TriangleQuality, Witness, WitnessSide,
 };
 pub use hausdorff::{DistanceOptions, distances};
 pub use judge::{Judge, JudgeOptions, Truth};

@@ -7,7 +7,7 @@
 //!    B. Kimia 2004, *A formal classification of 3D medial axis points and their local geometry*,
 //!    <https://doi.org/10.1109/TPAMI.2004.1262192>).
 //! 3. *Centrality* of a point: the ball that touches the surface where it is closest to the point is shrunk to a medial one.
-//!    The distances to the two contacts differ by 0 on the axis, and their chord is normal to a sheet.
+//!    The distances to the two contacts differ by 0 on the axis.
 //! 4. *Features*: points of sharp convex edges that the boundary of the medial mesh reaches with small radii; concave
 //!    edges, which it must not reach.
 //! 5. *Completeness*: distance from the medial balls of surface points ([`shrinking_ball`]) to the medial mesh.
@@ -17,19 +17,18 @@
 
 use std::sync::Arc;
 
-use glam::DVec4;
 use rayon::prelude::*;
 
-use super::axis_distance::{PreparedAxis, lifted, sample_segments};
+use super::axis_distance::{PreparedAxis, sample_segments};
 use super::error::MetricError;
 use super::evaluation::{
     Centrality, Completeness, ContactTable, ContactType, Features, GraphSizes, Outside,
-    SheetDifference, SheetPair, Structure, share,
+    SheetDifference, Structure, share,
 };
 use super::hausdorff::Summary;
 use super::samples::place_on_triangles;
 use crate::Vec3;
-use crate::complex::{Incidence, MedialMesh, SheetGraph, SheetOptions, Sphere};
+use crate::complex::{Incidence, MedialMesh, SheetGraph, SheetOptions};
 use crate::geometry::DisjointSets;
 use crate::geometry::trees::in_morton_order;
 use crate::surface::{
@@ -77,9 +76,6 @@ const OUTSIDE_SIDE: f64 = 16.0;
 /// Approximate limit of all of these samples.
 const OUTSIDE_SAMPLES: f64 = 2e5;
 
-/// Limit of sheets whose areas are listed.
-const LISTED: usize = 32;
-
 /// What the structure of all medial meshes is measured against: one surface.
 pub struct StructureSurface {
     tree: Arc<TriangleBvh>,
@@ -87,10 +83,10 @@ pub struct StructureSurface {
     /// For each face those across its sides, and the corners.
     around: Vec<[u32; 3]>,
     corners: Vec<[Vec3; 3]>,
-    /// Samples along convex and along concave sharp edges, and their lengths.
-    edges: [(Vec<Vec3>, f64); 2],
-    convex_corners: Vec<Vec3>,
-    balls: Vec<Sphere>,
+    /// Samples along convex and along concave sharp edges.
+    edges: [Vec<Vec3>; 2],
+    /// Centres of the medial balls of surface points.
+    balls: Vec<Vec3>,
 }
 
 impl StructureSurface {
@@ -112,19 +108,11 @@ impl StructureSurface {
         let place = |v: u32| surface.vertices[v as usize];
         let edges = [true, false].map(|convex| {
             let chosen = sharp.iter().filter(|edge| edge.convex == convex);
-            let segments: Vec<_> =
-                chosen.map(|e| e.vertices.map(|v| place(v).extend(0.0))).collect();
-            let length = segments.iter().map(|[a, b]| a.distance(*b)).sum::<f64>() + 0.0;
+            let segments: Vec<_> = chosen.map(|e| e.vertices.map(place)).collect();
+            let length = segments.iter().map(|[a, b]| a.distance(*b)).sum::<f64>();
             let count = (length / FEATURE_SPACING).clamp(1.0, FEATURE_SAMPLES);
-            let samples = sample_segments(&segments, count as usize).into_iter();
-            (samples.map(DVec4::truncate).collect(), length)
+            sample_segments(&segments, count as usize)
         });
-        let mut at = vec![[0_u32; 2]; surface.vertices.len()];
-        for edge in &sharp {
-            edge.vertices.iter().for_each(|&v| at[v as usize][usize::from(edge.convex)] += 1);
-        }
-        let is_corner = |&(_, &[concave, convex]): &(u32, &[u32; 2])| concave == 0 && convex >= 3;
-        let convex_corners = (0..).zip(&at).filter(is_corner).map(|(v, _)| place(v)).collect();
         let normals = smooth_normals(surface, &flat, smooth);
         let stride = points.len().div_ceil(SURFACE_SAMPLES).max(1);
         let ball = |&p: &Vec3| {
@@ -134,11 +122,11 @@ impl StructureSurface {
             let normal = (0..3).map(|k| weights[k] * normals[k]).sum::<Vec3>().try_normalize()?;
             let ball = shrinking_ball(on.point, normal, 0.5, Touched::Mesh(&tree));
             let is_medial = ball.steps > 0 && ball.end != End::InFront;
-            (is_medial && ball.sphere.radius > ON_SURFACE).then_some(ball.sphere)
+            (is_medial && ball.sphere.radius > ON_SURFACE).then_some(ball.sphere.centre)
         };
         let chosen: Vec<Vec3> = points.iter().step_by(stride).copied().collect();
         let balls = chosen.par_iter().filter_map(ball).collect();
-        Self { around: around(&surface.faces), tree, inside, corners, edges, convex_corners, balls }
+        Self { around: around(&surface.faces), tree, inside, corners, edges, balls }
     }
 
     /// The contacts at a point: see the head of this module. Cost that of the faces within reach.
@@ -177,9 +165,8 @@ impl StructureSurface {
         }
     }
 
-    /// The difference of the distances to two contacts, and the direction of their chord; `None` of a point that is not
-    /// inside.
-    fn central(&self, p: Vec3) -> Option<(f64, Vec3)> {
+    /// The difference of the distances to two contacts; `None` of a point that is not inside.
+    fn central(&self, p: Vec3) -> Option<f64> {
         let closest = self.tree.closest(p);
         if closest.distance < ON_SURFACE || self.inside.side(p) != Side::Inside {
             return None;
@@ -187,8 +174,7 @@ impl StructureSurface {
         let outward = (closest.point - p) / closest.distance;
         let contact =
             shrinking_ball(closest.point, outward, 0.5, Touched::Mesh(&self.tree)).contact?;
-        let chord = (closest.point - contact).try_normalize()?;
-        Some(((contact.distance(p) - closest.distance).abs(), chord))
+        Some((contact.distance(p) - closest.distance).abs())
     }
 
     /// The structure of a medial mesh in normalised units; `pockets` is its second Betti number beyond the cavities.
@@ -210,7 +196,7 @@ impl StructureSurface {
             features: self.features(mesh),
             completeness: self.completeness(axis),
             known: known.and_then(|known| sheet_difference(mesh, known).ok()),
-            graph: sizes(mesh, &graph, pockets),
+            graph: sizes(&graph, pockets),
         }
     }
 
@@ -221,8 +207,9 @@ impl StructureSurface {
         let placed = place_on_triangles(&triangles, SHEET_SAMPLES, 0).unwrap_or_default();
         let sheet: Vec<Vec3> = placed.iter().map(|placed| placed.on(&triangles)).collect();
         let along = |edges: &mut dyn Iterator<Item = [u32; 2]>| -> Vec<Vec3> {
-            let segments: Vec<_> = edges.map(|edge| mesh.spheres_of(edge).map(lifted)).collect();
-            sample_segments(&segments, CURVE_SAMPLES).into_iter().map(DVec4::truncate).collect()
+            let segments: Vec<_> =
+                edges.map(|edge| mesh.spheres_of(edge).map(|s| s.centre)).collect();
+            sample_segments(&segments, CURVE_SAMPLES)
         };
         let seam = along(&mut graph.seams.iter().flat_map(|seam| seam.edges.iter().copied()));
         let curve = along(&mut graph.curves.iter().flat_map(|curve| curve.edges.iter().copied()));
@@ -238,22 +225,9 @@ impl StructureSurface {
         });
         let [boundary, sheet_row, seam, junction, curve_row] = rows;
         let table = ContactTable { boundary, sheet: sheet_row, seam, junction, curve: curve_row };
-        let central =
-            |points: &[Vec3]| -> Vec<_> { points.par_iter().map(|&p| self.central(p)).collect() };
-        let (of_sheet, of_curve) = (central(&sheet), central(&curve));
-        let angles = placed.iter().zip(&of_sheet).filter_map(|(placed, found)| {
-            let [a, b, c] = triangles[placed.triangle];
-            let ((_, chord), normal) = ((*found)?, (b - a).cross(c - a).try_normalize()?);
-            // The arc tangent is exact where the angle is small.
-            Some(normal.cross(chord).length().atan2(normal.dot(chord).abs()).to_degrees())
-        });
-        let angles: Vec<f64> = angles.collect();
-        let differences =
-            of_sheet.iter().chain(&of_curve).flatten().map(|&(difference, _)| difference);
-        let differences: Vec<f64> = differences.collect();
-        let [mean, p95] = mean_and_p95(&differences);
-        let [angle_mean, angle_p95] = mean_and_p95(&angles);
-        (table, Centrality { mean, p95, angle_mean, angle_p95 })
+        let samples = [sheet, curve].concat();
+        let differences: Vec<f64> = samples.par_iter().filter_map(|&p| self.central(p)).collect();
+        (table, Centrality { p95: p95(&differences) })
     }
 
     fn features(&self, mesh: &MedialMesh) -> Features {
@@ -263,32 +237,14 @@ impl StructureSurface {
             let near = in_morton_order(points, |(): &mut (), p| near(p));
             share(near.iter().filter(|&&near| near).count() as u32, near.len() as u32)
         };
-        let [(convex, convex_length), (concave, concave_length)] = &self.edges;
-        Features {
-            convex_length: *convex_length,
-            convex_reached: reached(convex),
-            concave_length: *concave_length,
-            concave_reached: reached(concave),
-            corners: self.convex_corners.len() as u32,
-            corners_reached: reached(&self.convex_corners),
-        }
+        let [convex_reached, concave_reached] = self.edges.each_ref().map(|points| reached(points));
+        Features { convex_reached, concave_reached }
     }
 
     fn completeness(&self, axis: &PreparedAxis) -> Completeness {
-        let simplices = axis.parts.simplices();
-        let centres: Vec<Vec3> = self.balls.iter().map(|ball| ball.centre).collect();
-        let closest = axis.in_space.closest_batch(&centres);
-        let distances: Vec<f64> = closest.iter().map(|closest| closest.distance).collect();
-        let radii = self.balls.iter().zip(&closest).map(|(ball, closest)| {
-            let simplex = simplices[closest.face as usize];
-            let weights = weights(closest.point, &simplex.map(DVec4::truncate));
-            ((0..3).map(|k| weights[k] * simplex[k].w).sum::<f64>() - ball.radius).abs()
-        });
-        let [[_, p95], [_, radius_p95]] =
-            [mean_and_p95(&distances), mean_and_p95(&radii.collect::<Vec<_>>())];
+        let distances = axis.tree.distance_batch(&self.balls);
         let found = distances.iter().filter(|&&distance| distance <= REACHED).count() as u32;
-        let balls = distances.len() as u32;
-        Completeness { balls, found: share(found, balls), p95, radius_p95 }
+        Completeness { found: share(found, distances.len() as u32), p95: p95(&distances) }
     }
 
     /// By samples of every edge and face. A sample within the clearance of a sphere of the same simplex is inside.
@@ -364,19 +320,14 @@ impl StructureSurface {
     }
 }
 
-fn sizes(mesh: &MedialMesh, graph: &SheetGraph, pockets: u64) -> GraphSizes {
+fn sizes(graph: &SheetGraph, pockets: u64) -> GraphSizes {
     let seam_length: f64 = graph.seams.iter().map(|seam| seam.length).sum();
     let of_three = graph.seams.iter().filter(|seam| seam.sheets.len() == 3);
     let of_three: f64 = of_three.map(|seam| seam.length).sum();
-    let boundary = graph.boundary.iter().map(|&edge| {
-        let [a, b] = mesh.spheres_of(edge);
-        a.centre.distance(b.centre)
-    });
     let positive = |sum: f64| sum + 0.0; // an empty sum is -0.0
     GraphSizes {
         sheets: graph.areas.len() as u64,
         sheet_area: positive(graph.areas.iter().sum()),
-        areas: graph.areas.iter().take(LISTED).copied().collect(),
         small_pieces: graph.small_pieces,
         small_area: graph.small_area,
         pockets,
@@ -384,9 +335,7 @@ fn sizes(mesh: &MedialMesh, graph: &SheetGraph, pockets: u64) -> GraphSizes {
         seam_length: positive(seam_length),
         seams_of_three: (seam_length > 0.0).then(|| of_three / seam_length),
         curves: graph.curves.len() as u64,
-        curve_length: positive(graph.curves.iter().map(|curve| curve.length).sum()),
         junctions: graph.junctions.len() as u64,
-        boundary_length: positive(boundary.sum()),
     }
 }
 
@@ -455,9 +404,8 @@ fn distance_to_segment(p: Vec3, a: Vec3, b: Vec3) -> f64 {
     p.distance(a + t * along)
 }
 
-fn mean_and_p95(values: &[f64]) -> [Option<f64>; 2] {
-    let summary = Summary::new(values);
-    [summary.mean, summary.p95].map(|value| (!values.is_empty()).then_some(value))
+fn p95(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| Summary::new(values).p95)
 }
 
 // Sheets of two medial meshes against each other.
@@ -483,28 +431,15 @@ pub(super) fn sheet_difference(
     let there = partners(&first, &second);
     let back = partners(&second, &first);
     let (areas, known) = (&first.1.areas, &second.1.areas);
-    let mut matched = Vec::new();
-    let mut is_matched = vec![false; areas.len()];
-    let mut missing = Vec::new();
-    for (sheet, partner) in back.iter().enumerate() {
-        let mutual = partner.and_then(|(other, overlap)| {
-            let (there, over) = there[other as usize]?;
-            (there as usize == sheet).then_some((other as usize, [over, overlap]))
-        });
-        match mutual {
-            Some((other, overlap)) => {
-                is_matched[other] = true;
-                matched.push(SheetPair { areas: [areas[other], known[sheet]], overlap });
-            }
-            None => missing.push(known[sheet]),
-        }
-    }
-    let spurious: Vec<f64> = areas
-        .iter()
-        .zip(is_matched)
-        .filter(|(_, matched)| !matched)
-        .map(|(&area, _)| area)
-        .collect();
+    // Areas of the sheets without a partner that has them as its own.
+    let unmatched = |own: &[Option<u32>], others: &[Option<u32>], areas: &[f64]| -> Vec<f64> {
+        let is_matched = |&sheet: &usize| {
+            own[sheet].is_some_and(|other| others[other as usize] == Some(sheet as u32))
+        };
+        (0..areas.len()).filter(|sheet| !is_matched(sheet)).map(|sheet| areas[sheet]).collect()
+    };
+    let spurious = unmatched(&there, &back, areas);
+    let missing = unmatched(&back, &there, known);
     let share = |part: &[f64], all: &[f64]| {
         let all: f64 = all.iter().sum();
         (all > 0.0).then(|| (part.iter().sum::<f64>() + 0.0) / all)
@@ -512,23 +447,21 @@ pub(super) fn sheet_difference(
     Ok(SheetDifference {
         spurious_share: share(&spurious, areas),
         missing_share: share(&missing, known),
-        matched,
-        spurious,
-        missing,
+        matched: known.len() - missing.len(),
+        spurious: spurious.len(),
+        missing: missing.len(),
     })
 }
 
-/// For each sheet of a mesh the sheet of another that is nearest to more than half of it, and the share.
+/// For each sheet of a mesh the sheet of another that is nearest to more than half of it.
 fn partners(
     (axis, graph): &(PreparedAxis, SheetGraph),
     (other, other_graph): &(PreparedAxis, SheetGraph),
-) -> Vec<Option<(u32, f64)>> {
-    let triangles = axis.parts.triangles.iter().map(|t| t.map(DVec4::truncate));
-    let triangles: Vec<[Vec3; 3]> = triangles.collect();
-    let placed = place_on_triangles(&triangles, MATCH_SAMPLES, 0).unwrap_or_default();
-    let points: Vec<Vec3> = placed.iter().map(|placed| placed.on(&triangles)).collect();
+) -> Vec<Option<u32>> {
+    let placed = place_on_triangles(&axis.triangles, MATCH_SAMPLES, 0).unwrap_or_default();
+    let points: Vec<Vec3> = placed.iter().map(|placed| placed.on(&axis.triangles)).collect();
     let mut found: Vec<Vec<u32>> = vec![Vec::new(); graph.areas.len()];
-    for (placed, closest) in placed.iter().zip(other.in_space.closest_batch(&points)) {
+    for (placed, closest) in placed.iter().zip(other.tree.closest_batch(&points)) {
         let Some(sheet) = graph.sheet_of_face[placed.triangle] else { continue };
         // Curves and isolated spheres follow the faces.
         let there = other_graph.sheet_of_face.get(closest.face as usize).copied().flatten();
@@ -540,8 +473,7 @@ fn partners(
     let best = found.into_iter().map(|mut votes| {
         votes.sort_unstable();
         let most = votes.chunk_by(|a, b| a == b).max_by_key(|run| run.len())?;
-        let share = most.len() as f64 / votes.len() as f64;
-        (most[0] != u32::MAX && share > 0.5).then_some((most[0], share))
+        (most[0] != u32::MAX && 2 * most.len() > votes.len()).then_some(most[0])
     });
     best.collect()
 }
@@ -561,6 +493,7 @@ mod tests {
     use rand_pcg::Pcg64;
 
     use super::*;
+    use crate::complex::Sphere;
     use crate::metrics::spikes::tests::box_axis;
     use crate::surface::fixtures::cuboid;
 
@@ -628,22 +561,17 @@ mod tests {
         let graph = &found.graph;
         assert_eq!((graph.sheets, graph.seams, graph.junctions, graph.curves), (13, 12, 4, 0));
         assert_eq!((graph.small_pieces, graph.seams_of_three), (0, Some(1.0)));
-        // Twelve edges of the box, which the axis reaches.
-        let edges = 24.0 / 14f64.sqrt();
-        assert!((graph.boundary_length - edges).abs() < 1e-12);
-        assert!((found.features.convex_length - edges).abs() < 1e-12);
-        assert_eq!(found.features.convex_reached, Some(1.0));
-        assert_eq!((found.features.corners, found.features.corners_reached), (8, Some(1.0)));
-        assert_eq!((found.features.concave_length, found.features.concave_reached), (0.0, None));
+        let features = found.features;
+        assert_eq!((features.convex_reached, features.concave_reached), (Some(1.0), None));
         assert!(found.completeness.p95.unwrap() < 1e-3, "{:?}", found.completeness);
         assert_eq!(found.completeness.found, Some(1.0));
-        assert!(found.centrality.p95.unwrap() < 1e-4 && found.centrality.angle_p95.unwrap() < 1.0);
+        assert!(found.centrality.p95.unwrap() < 1e-4);
         assert_eq!(found.outside, Outside::default());
         // Next to a junction a seam has four contacts.
         assert!(found.contacts.seams_right().unwrap() > 0.97);
         assert!(found.contacts.right().unwrap() > 0.9, "{:?}", found.contacts);
         let known = found.known.unwrap();
-        assert_eq!((known.matched.len(), known.missing_share), (13, Some(0.0)));
+        assert_eq!((known.matched, known.missing_share), (13, Some(0.0)));
     }
 
     #[test]
@@ -684,11 +612,10 @@ mod tests {
     }
 
     #[test]
-    fn off_the_axis_the_difference_is_twice_the_shift_and_a_turn_is_its_angle() {
+    fn off_the_axis_the_difference_is_twice_the_shift() {
         let surface = surface();
-        let (difference, chord) = surface.central(Vec3::new(0.02, 0.01, 0.013)).unwrap();
+        let difference = surface.central(Vec3::new(0.02, 0.01, 0.013)).unwrap();
         assert!((difference - 0.026).abs() < 1e-9, "{difference}");
-        assert!(chord.z.abs() > 1.0 - 1e-9);
         assert!(surface.central(2.0 * half()).is_none());
     }
 
@@ -699,13 +626,13 @@ mod tests {
         let upright = axis.faces.iter().position(|face| face == &[0, 4, 8]).unwrap();
         let found = structure(&without(upright));
         let known = found.known.unwrap();
-        assert_eq!((known.matched.len(), known.missing.len(), known.spurious.len()), (12, 1, 0));
+        assert_eq!((known.matched, known.missing, known.spurious), (12, 1, 0));
         assert!(found.completeness.found.unwrap() < 1.0);
         let reached = found.features.convex_reached.unwrap();
         // One of twelve edges, 1 of 24 units long; its ends are near others.
         assert!((0.955..0.968).contains(&reached), "{reached}");
         let back = sheet_difference(&axis, &without(upright)).unwrap();
-        assert_eq!((back.matched.len(), back.missing.len(), back.spurious.len()), (12, 0, 1));
+        assert_eq!((back.matched, back.missing, back.spurious), (12, 0, 1));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Measures a mesh and decides whether it may be used: closed, manifold, two-sided, with volume.
 
+use super::Inspection;
 use super::intersections::{Intersections, intersections};
 use super::mesh::{Normalisation, TriMesh, Unit};
 use super::repair::Repaired;
@@ -9,15 +10,8 @@ use super::topology::{self, Shell, Topology};
 use crate::Vec3;
 use crate::sum::Sum;
 
-/// A mesh with its report, and the reason why it may not be used, if any.
-pub(super) struct Examined {
-    pub mesh: TriMesh,
-    pub report: SurfaceReport,
-    pub fault: Option<Fault>,
-}
-
 /// Orients a repaired mesh and examines it.
-pub(super) fn orient_and_examine(repaired: Repaired) -> Examined {
+pub(super) fn orient_and_examine(repaired: Repaired) -> Inspection {
     let Repaired { vertices, faces, file_vertex, topology, unit, points, mut repairs, warnings } =
         repaired;
     let mut mesh = TriMesh { vertices, faces };
@@ -52,7 +46,7 @@ pub(super) fn orient_and_examine(repaired: Repaired) -> Examined {
     let wrong = topology.component.iter().map(|&c| wrong.get(c as usize) == Some(&true));
     topology::turn_over(&mut mesh.faces, wrong);
     report.repairs = repairs;
-    Examined { mesh, report, fault }
+    Inspection { mesh, report, refused: fault.map(Into::into), file: None }
 }
 
 /// Examines a mesh as it is: nothing is repaired, every defect is a fault.

@@ -2,15 +2,13 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::PI;
-use std::path::Path;
 
 use super::check::orient_and_examine;
-use super::format::content;
 use super::repair::repair;
 use super::report::{Fault, Repair, VertexName};
 use super::soup::PolygonSoup;
 use super::topology::Topology;
-use super::{Format, Loaded, SurfaceError, TriMesh, accept, examine, in_file};
+use super::{Inspection, Loaded, SurfaceError, TriMesh};
 use crate::Vec3;
 
 /// Which parts of a surface are kept.
@@ -36,55 +34,38 @@ pub struct MendOptions {
     pub components: Components,
 }
 
-/// Reads a surface and repairs more than [`read`](super::read) does; the result must pass the checks
-/// of [`read`](super::read). Only vertices of separated parts are moved. The report lists all repairs
-/// in order.
-///
-/// # Errors
-/// As [`read`](super::read) after the repairs, and when a hole is too long to be
-/// filled, meets itself, or cannot be closed without edges that are there already.
-///
-/// # Cost
-/// That of [`read`](super::read) twice, and `O(n^3)` for a hole of `n` edges.
-pub fn mend(path: impl AsRef<Path>, options: MendOptions) -> Result<Loaded, SurfaceError> {
-    let path = path.as_ref();
-    Format::of(path)
-        .and_then(|format| mended(&content(path)?, format, options))
-        .map_err(|fault| in_file(path, fault))
+impl Inspection {
+    /// Repairs more than [`read`](super::read) does; the result must pass its checks. Only vertices of separated parts are
+    /// moved. The report lists all repairs in order.
+    ///
+    /// # Errors
+    /// As [`read`](super::read) after the repairs, and when a hole is too long to be
+    /// filled, meets itself, or cannot be closed without edges that are there already.
+    ///
+    /// # Cost
+    /// That of [`read`](super::read), and `O(n^3)` for a hole of `n` edges.
+    ///
+    /// ```
+    /// use medial::surface::{self, MendOptions};
+    ///
+    /// let open = b"OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n";
+    /// let options = MendOptions { fill_holes: true, ..MendOptions::default() };
+    /// let mended = surface::inspect_bytes("open.off", open)?.mend(options)?;
+    /// assert_eq!(mended.mesh.faces.len(), 4);
+    /// assert_eq!(mended.report.repairs[0].to_string(), "filled a hole of 3 edges with 1 triangle");
+    /// # Ok::<(), medial::surface::SurfaceError>(())
+    /// ```
+    pub fn mend(self, options: MendOptions) -> Result<Loaded, SurfaceError> {
+        let file = self.file.clone();
+        mended(self, options).map_err(|error| SurfaceError { file, ..error })
+    }
 }
 
-/// [`mend`] for the content of a file.
-///
-/// # Errors
-/// As [`mend`], without the name of a file.
-///
-/// ```
-/// use medial::surface::{Format, MendOptions, mend_bytes};
-///
-/// let open = b"OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n";
-/// let options = MendOptions { fill_holes: true, ..MendOptions::default() };
-/// let mended = mend_bytes(open, Format::Off, options)?;
-/// assert_eq!(mended.mesh.faces.len(), 4);
-/// assert_eq!(mended.report.repairs[0].to_string(), "filled a hole of 3 edges with 1 triangle");
-/// # Ok::<(), medial::surface::SurfaceError>(())
-/// ```
-pub fn mend_bytes(
-    bytes: &[u8],
-    format: Format,
-    options: MendOptions,
-) -> Result<Loaded, SurfaceError> {
-    Ok(mended(bytes, format, options)?)
-}
-
-fn mended(bytes: &[u8], format: Format, options: MendOptions) -> Result<Loaded, Fault> {
-    let examined = examine(bytes, format)?;
-    let mut mesh = examined.mesh;
-    let mut repairs = examined.report.repairs;
-    let mut warnings = match &examined.fault {
-        // The examination of the result repeats its warnings; a failed one has none of the reader.
-        Some(_) => Vec::new(),
-        None => examined.report.warnings,
-    };
+fn mended(inspection: Inspection, options: MendOptions) -> Result<Loaded, SurfaceError> {
+    let Inspection { mut mesh, report, refused, .. } = inspection;
+    let mut repairs = report.repairs;
+    // The examination of the result repeats its warnings; a failed one has none of the reader.
+    let mut warnings = if refused.is_some() { Vec::new() } else { report.warnings };
     if options.components == Components::Largest {
         repairs.extend(keep_largest(&mut mesh));
     }
@@ -97,7 +78,7 @@ fn mended(bytes: &[u8], format: Format, options: MendOptions) -> Result<Loaded, 
         repairs.extend(fill(&vertices, &mut faces)?);
     }
     let soup = PolygonSoup::of_triangles(&vertices, &faces)?;
-    let mut loaded = accept(orient_and_examine(repair(soup)?))?;
+    let mut loaded = orient_and_examine(repair(soup)?).solid()?;
     repairs.append(&mut loaded.report.repairs);
     loaded.report.repairs = repairs;
     warnings.retain(|warning| !loaded.report.warnings.contains(warning));

@@ -30,7 +30,7 @@ mod stl;
 mod text;
 mod topology;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::Vec3;
 
@@ -39,7 +39,7 @@ pub use contract::{Contraction, Folds, contract_short_edges, crust_surface};
 pub use creases::{SharpEdge, sharp_edges, smooth_normals};
 pub use format::Format;
 pub use inside::{InsideTest, Side, SignedDistance};
-pub use mend::{Components, MendOptions, mend, mend_bytes};
+pub use mend::{Components, MendOptions};
 #[cfg(test)]
 pub(crate) use mesh::fixtures;
 pub use mesh::{Normalisation, TriMesh, write};
@@ -65,6 +65,8 @@ pub struct Inspection {
     pub report: SurfaceReport,
     /// The error of [`read`] for this surface, if any.
     pub refused: Option<SurfaceError>,
+    /// Name of the file in errors.
+    file: Option<PathBuf>,
 }
 
 impl Inspection {
@@ -117,7 +119,7 @@ pub fn content(path: impl AsRef<Path>) -> Result<Vec<u8>, SurfaceError> {
 /// # Errors
 /// As [`read`], without the name of a file.
 pub fn read_bytes(bytes: &[u8], format: Format) -> Result<Loaded, SurfaceError> {
-    Ok(examine(bytes, format).and_then(accept)?)
+    examine(bytes, format)?.solid()
 }
 
 /// Examines a surface that may be unfit for [`read`].
@@ -139,8 +141,10 @@ pub fn inspect(path: impl AsRef<Path>) -> Result<Inspection, SurfaceError> {
 pub fn inspect_bytes(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Inspection, SurfaceError> {
     let path = path.as_ref();
     let examined = Format::of(path).and_then(|format| examine(bytes, format));
-    let check::Examined { mesh, report, fault } = examined.map_err(|fault| in_file(path, fault))?;
-    Ok(Inspection { mesh, report, refused: fault.map(|fault| in_file(path, fault)) })
+    let mut examined = examined.map_err(|fault| in_file(path, fault))?;
+    examined.file = Some(path.to_owned());
+    examined.refused.iter_mut().for_each(|error| error.file.clone_from(&examined.file));
+    Ok(examined)
 }
 
 /// [`read`] for arrays: the same repairs, the same orientation, the same refusals.
@@ -162,7 +166,7 @@ pub fn inspect_bytes(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Inspection,
 /// ```
 pub fn read_triangles(vertices: &[Vec3], faces: &[[u32; 3]]) -> Result<Loaded, SurfaceError> {
     let soup = soup::PolygonSoup::of_triangles(vertices, faces)?;
-    Ok(accept(check::orient_and_examine(repair::repair(soup)?))?)
+    check::orient_and_examine(repair::repair(soup)?).solid()
 }
 
 /// Checks a mesh that was not read from a file. Nothing is repaired: repeated corners, duplicate
@@ -189,16 +193,9 @@ pub fn validate(mesh: &TriMesh) -> Result<SurfaceReport, SurfaceError> {
     Ok(check::examine_unrepaired(mesh)?)
 }
 
-fn examine(bytes: &[u8], format: Format) -> Result<check::Examined, Fault> {
+fn examine(bytes: &[u8], format: Format) -> Result<Inspection, Fault> {
     let repaired = repair::repair(format::parse(bytes, format)?)?;
     Ok(check::orient_and_examine(repaired))
-}
-
-fn accept(examined: check::Examined) -> Result<Loaded, Fault> {
-    match examined.fault {
-        Some(fault) => Err(fault),
-        None => Ok(Loaded { mesh: examined.mesh, report: examined.report }),
-    }
 }
 
 fn in_file(path: &Path, fault: Fault) -> SurfaceError {

@@ -6,9 +6,8 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, UnionError};
 use medial::geometry::{Cone, Slab, Sphere};
 use medial::metrics::{
-    AxisOptions, Certificate, DistanceOptions, Distances, EnvelopeOptions, MetricError, ROUNDING,
-    VolumeOptions, Witness, WitnessSide, axis_distance, certify, distances, enclosed_volume,
-    sample_envelope, volume_error,
+    Certificate, DistanceOptions, Distances, EnvelopeOptions, MetricError, ROUNDING, VolumeOptions,
+    Witness, WitnessSide, certify, distances, enclosed_volume, sample_envelope, volume_error,
 };
 use medial::surface::{TriMesh, TriangleBvh};
 use rand::{RngExt, SeedableRng};
@@ -230,61 +229,6 @@ fn unions_without_area_are_measured_at_their_centres() {
     assert!((d.epsilon_union - (4.0_f64 + 1.0 + 0.5625).sqrt()).abs() < 1e-12);
 }
 
-/// The central rectangle of a box's axis: the triangles whose corners have the largest radius.
-fn central(axis: &MedialMesh) -> MedialMesh {
-    let largest = axis.spheres.iter().fold(0.0, |r, m| f64::max(r, m.radius));
-    let kept: Vec<bool> = axis.spheres.iter().map(|m| m.radius > largest - 1e-9).collect();
-    axis.induced(&kept)
-}
-
-#[test]
-fn axes_are_compared_as_point_sets() {
-    let (_, axis) = cuboid(3.0, 2.0, 1.0);
-    let options = AxisOptions { samples: 5_000, seed: 0 };
-    let same = axis_distance(&axis, &axis, &options).unwrap();
-    assert!(
-        same.in_space.computed_to_true_max < 1e-14 && same.in_space.true_to_computed_mean < 1e-15
-    );
-
-    let shifted = axis.transformed(1.0, |p| p + 0.01 * Vec3::Z);
-    let off = axis_distance(&shifted, &axis, &options).unwrap();
-    assert!((off.in_space.computed_to_true_max - 0.01).abs() < 1e-6, "{off:?}");
-
-    // The same place, all radii larger; and half of the sheets gone.
-    let mut thicker = axis.clone();
-    thicker.spheres.iter_mut().for_each(|m| m.radius += 0.02);
-    let off = axis_distance(&thicker, &axis, &options).unwrap();
-    assert!(off.in_space.computed_to_true_max < 1e-14, "{off:?}");
-    // A sheet of slope s in the radius is nearer by the factor 1 / sqrt(1 + s^2).
-    let steepest = 1.0 / 1.5_f64.sqrt();
-    let apart = off.with_radius.computed_to_true_mean / 0.02;
-    assert!((steepest - 1e-9..=1.0 + 1e-9).contains(&apart), "{off:?}");
-    assert!((off.with_radius.true_to_computed_max - 0.02).abs() < 1e-9, "{off:?}");
-    assert_eq!(same.coverage.len(), 13, "{same:?}");
-    assert!(same.coverage.iter().all(|sheet| sheet.covered == Some(1.0)), "{same:?}");
-    let middle = axis_distance(&central(&axis), &axis, &options).unwrap();
-    let covered: Vec<f64> = middle.coverage.iter().filter_map(|sheet| sheet.covered).collect();
-    assert_eq!(covered.iter().filter(|&&share| share == 1.0).count(), 1, "{middle:?}");
-    assert!(covered.iter().filter(|&&share| share < 0.05).count() == 12, "{middle:?}");
-
-    // A segment against a longer one: everything of the short one is near, but not conversely.
-    let ends = |a: f64, b: f64, y: f64| [(Vec3::new(a, y, 0.0), 0.1), (Vec3::new(b, y, 0.0), 0.1)];
-    let short = complex(&ends(0.0, 1.0, 0.5), &[[0, 1]], &[]);
-    let long = complex(&ends(0.0, 2.0, 0.0), &[[0, 1]], &[]);
-    let d = axis_distance(&short, &long, &options).unwrap();
-    assert!((d.in_space.computed_to_true_max - 0.5).abs() < 1e-15);
-    assert!((d.in_space.computed_to_true_mean - 0.5).abs() < 1e-15);
-    assert!((d.in_space.true_to_computed_max - 1.25_f64.sqrt()).abs() < 1e-15);
-    // Mean over [1, 2] of the hypotenuse over (x - 1, 0.5), by its antiderivative.
-    let tail = 0.5 * 1.25_f64.sqrt() + 0.125 * 2.0_f64.asinh();
-    assert!((d.in_space.true_to_computed_mean - (0.5 + tail) / 2.0).abs() < 1e-6);
-
-    let point = complex(&[(Vec3::Y, 0.1)], &[], &[]);
-    let d = axis_distance(&point, &long, &options).unwrap();
-    assert_eq!((d.in_space.computed_to_true_max, d.in_space.computed_to_true_mean), (1.0, 1.0));
-    assert!((d.in_space.true_to_computed_max - 5.0_f64.sqrt()).abs() < 1e-15);
-}
-
 #[test]
 fn results_do_not_depend_on_threads() {
     let (surface, axis) = cuboid(3.0, 2.0, 1.0);
@@ -325,7 +269,6 @@ fn unmeasurable_inputs_are_rejected() {
     let open = TriMesh { vertices: surface.vertices.clone(), faces: vec![[0, 1, 2]] };
     let error = volume_error(&open, &bvh, |_| false, &union, &VolumeOptions::default());
     assert!(matches!(error, Err(MetricError::NoVolume(_))));
-    assert!(axis_distance(&empty, &axis, &AxisOptions::default()).is_err());
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use medial::Vec3;
 use medial::surface::{
-    self, Components, Fault, Format, Loaded, MendOptions, Repair, SurfaceError, TriMesh, mend_bytes,
+    self, Components, Fault, Format, Loaded, MendOptions, Repair, SurfaceError, TriMesh,
 };
 use proptest::prelude::*;
 
@@ -230,7 +230,7 @@ const FILL: MendOptions =
     MendOptions { fill_holes: true, separate: false, components: Components::All };
 
 fn mend(mesh: &TriMesh, options: MendOptions) -> Result<Loaded, SurfaceError> {
-    mend_bytes(to_off(mesh).as_bytes(), Format::Off, options)
+    surface::inspect_bytes("mesh.off", to_off(mesh).as_bytes()).unwrap().mend(options)
 }
 
 /// A lattice box of `n` cells along each side, without the faces that `dropped` names by centroid.

@@ -17,7 +17,7 @@
 use std::collections::HashSet;
 
 use rayon::prelude::*;
-use search::{Nearer, Part, Parts, Reading, Shape, Signed, Unsigned};
+use search::{Nearer, Part, Parts, Shape, Signed, Unsigned};
 
 use super::{ComplexError, MedialMesh};
 use crate::Vec3;
@@ -177,15 +177,7 @@ impl MedialUnion {
     /// `sigma(p)`, searched from the primitive that the last call with the same `near` found. Faster
     /// for consecutive nearby points; the result is the same.
     pub(crate) fn signed_from(&self, p: Vec3, near: &mut usize) -> f64 {
-        self.nearest_from::<Signed>(p, near, f64::NEG_INFINITY).signed
-    }
-
-    /// The nearest primitive by a reading of the distance, or any that is near enough. Begins with the one at `near`,
-    /// which is then the place of the one that was found.
-    fn nearest_from<R: Reading>(&self, p: Vec3, near: &mut usize, enough: f64) -> NearestPrimitive {
-        let (nearest, place) = self.parts.nearest_or::<R>(p, *near, enough);
-        *near = place;
-        nearest
+        self.deepest_or(p, near, f64::NEG_INFINITY).signed
     }
 
     /// The signed distance to the primitive at a place alone; infinite where the cones of a slab's sides decide.
@@ -196,7 +188,7 @@ impl MedialUnion {
     /// The primitive of least signed distance, searched as in [`signed_from`](Self::signed_from), or any whose
     /// distance is at most `enough`.
     pub(crate) fn deepest_or(&self, p: Vec3, near: &mut usize, enough: f64) -> NearestPrimitive {
-        self.nearest_from::<Signed>(p, near, enough)
+        self.parts.nearest::<Signed>(p, near, enough)
     }
 
     /// The primitive of least signed distance, searched as in [`signed_from`](Self::signed_from), and the
@@ -206,7 +198,7 @@ impl MedialUnion {
         p: Vec3,
         near: &mut usize,
     ) -> (NearestPrimitive, Option<Vec3>) {
-        let nearest = self.nearest_from::<Signed>(p, near, f64::NEG_INFINITY);
+        let nearest = self.deepest_or(p, near, f64::NEG_INFINITY);
         (nearest, self.parts.shape(*near).nearest_centre(p).map(|(_, centre)| centre))
     }
 
@@ -216,7 +208,7 @@ impl MedialUnion {
     pub(crate) fn boundary_near(&self, p: Vec3, burial: f64, near: &mut usize) -> Option<Vec3> {
         let mut point = p;
         for _ in 0..MAX_EXITS {
-            let nearest = self.nearest_from::<Signed>(point, near, f64::NEG_INFINITY);
+            let nearest = self.deepest_or(point, near, f64::NEG_INFINITY);
             let (signed, centre) = self.parts.shape(*near).nearest_centre(point)?;
             if (-burial..=burial).contains(&signed) {
                 return Some(point);
@@ -230,17 +222,17 @@ impl MedialUnion {
     /// `mu(p)`: the least distance to the surface of a primitive, buried or not. Begun as in
     /// [`signed_from`](Self::signed_from).
     pub(crate) fn unsigned_from(&self, p: Vec3, near: &mut usize) -> f64 {
-        self.nearest_from::<Unsigned>(p, near, f64::NEG_INFINITY).signed.abs()
+        self.parts.nearest::<Unsigned>(p, near, f64::NEG_INFINITY).signed.abs()
     }
 
     /// The primitive of least signed distance.
     pub fn deepest(&self, p: Vec3) -> NearestPrimitive {
-        self.parts.nearest::<Signed>(p, 0).0
+        self.deepest_or(p, &mut 0, f64::NEG_INFINITY)
     }
 
     /// The primitive whose surface is nearest.
     pub fn nearest_surface(&self, p: Vec3) -> NearestPrimitive {
-        self.parts.nearest::<Unsigned>(p, 0).0
+        self.parts.nearest::<Unsigned>(p, &mut 0, f64::NEG_INFINITY)
     }
 
     /// [`signed`](Self::signed) for many points, in their order, in parallel.
@@ -271,11 +263,8 @@ impl MedialUnion {
             let (places, enough) = (&places, &enough);
             points.iter().zip(RUN * run..).map(move |(&p, i)| {
                 let named = near.get(i).and_then(|near| places.of(near.primitive));
-                let (start, enough) =
-                    (named.unwrap_or(last), enough(i).unwrap_or(f64::NEG_INFINITY));
-                let (nearest, place) = self.parts.nearest_or::<Signed>(p, start, enough);
-                last = place;
-                nearest
+                last = named.unwrap_or(last);
+                self.deepest_or(p, &mut last, enough(i).unwrap_or(f64::NEG_INFINITY))
             })
         });
         runs.collect()
@@ -285,7 +274,7 @@ impl MedialUnion {
     /// below the limit of the point. Fast where most are not.
     pub fn below_batch(&self, points: &[Vec3], limits: &[f64]) -> Vec<Option<NearestPrimitive>> {
         let pairs = points.par_iter().zip(limits).with_min_len(RUN);
-        pairs.map(|(&p, &limit)| self.parts.below(p, limit)).collect()
+        pairs.map(|(&p, &limit)| self.parts.below(p, limit, false)).collect()
     }
 
     /// For many points, in their order, in parallel: [`signed`](Self::signed), and the radius of the
@@ -300,7 +289,7 @@ impl MedialUnion {
     /// Whether some primitive holds `p` more than `depth` below its surface; with a negative depth,
     /// whether one is nearer than that. Ends at the first that is found.
     pub fn buries(&self, p: Vec3, depth: f64) -> bool {
-        self.parts.any_below(p, -depth).is_some()
+        self.parts.below(p, -depth, true).is_some()
     }
 
     /// The places of the points that no primitive [`buries`](Self::buries) deeper than `depth`, in their order, with

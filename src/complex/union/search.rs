@@ -26,45 +26,34 @@ pub(super) trait UnionSearch {
 }
 
 impl Parts {
-    /// The nearest primitive by a reading of the distance, and its place. Begins with the one at
-    /// `start`.
-    pub fn nearest<R: Reading>(&self, p: Vec3, start: usize) -> (NearestPrimitive, usize) {
-        self.nearest_or::<R>(p, start, f64::NEG_INFINITY)
-    }
-
-    /// As [`nearest`](Self::nearest), or the first one that is met whose distance is at most `enough`.
-    pub fn nearest_or<R: Reading>(
-        &self,
-        p: Vec3,
-        start: usize,
-        enough: f64,
-    ) -> (NearestPrimitive, usize) {
-        let mut search = Nearest::<R>::from(self, p, start, enough);
+    /// The nearest primitive by a reading of the distance, or the first one that is met whose distance is at most
+    /// `enough`. Begins with the one at `near`, which is then the place of the one that was found.
+    pub fn nearest<R: Reading>(&self, p: Vec3, near: &mut usize, enough: f64) -> NearestPrimitive {
+        let signed = self.shape(*near).signed(p);
+        let mut search = Nearest::<R>::new(self, p, *near, signed, enough);
+        search.tighten();
         if search.limit > f64::NEG_INFINITY {
             self.search(&mut search);
         }
-        search.answer()
+        *near = search.place;
+        NearestPrimitive { signed: search.signed, primitive: self.primitive(search.place) }
     }
 
-    /// The primitive of least signed distance, if that is below a limit.
-    pub fn below(&self, p: Vec3, limit: f64) -> Option<NearestPrimitive> {
-        let (place, signed) = self.search_below(p, limit, false)?;
-        Some(NearestPrimitive { signed, primitive: self.primitive(place) })
-    }
-
-    /// The place of the first primitive met whose signed distance is below a limit.
-    pub fn any_below(&self, p: Vec3, limit: f64) -> Option<usize> {
-        self.search_below(p, limit, true).map(|(place, _)| place)
-    }
-
-    fn search_below(&self, p: Vec3, limit: f64, any: bool) -> Option<(usize, f64)> {
+    /// The primitive of least signed distance, or `any`, if that distance is below a limit.
+    pub fn below(&self, p: Vec3, limit: f64, any: bool) -> Option<NearestPrimitive> {
         // Nothing is below that, and a search with it would visit all.
         if limit == f64::NEG_INFINITY {
             return None;
         }
-        let mut search = Below { parts: self, p, limit, any, found: None };
+        let enough = if any { limit.next_down() } else { f64::NEG_INFINITY };
+        let mut search = Nearest::<Signed>::new(self, p, NO_PLACE, limit, enough);
+        search.tighten();
         self.search(&mut search);
-        Some((search.found?, search.limit))
+        let found = search.place != NO_PLACE;
+        found.then(|| {
+            let primitive = self.primitive(search.place);
+            NearestPrimitive { signed: search.signed, primitive }
+        })
     }
 
     /// Shows to a search all primitives within its limit, and some others.
@@ -197,8 +186,11 @@ impl Reading for Unsigned {
     }
 }
 
+/// No place: only primitives below the first value count.
+const NO_PLACE: usize = usize::MAX;
+
 /// Search for the nearest primitive.
-pub(super) struct Nearest<'a, R> {
+struct Nearest<'a, R> {
     parts: &'a Parts,
     p: Vec3,
     place: usize,
@@ -211,22 +203,11 @@ pub(super) struct Nearest<'a, R> {
 }
 
 impl<'a, R: Reading> Nearest<'a, R> {
-    /// Begins with the primitive at a place.
+    /// Begins with the primitive at a place, and its signed distance.
     #[inline]
-    pub fn from(parts: &'a Parts, p: Vec3, place: usize, enough: f64) -> Self {
-        let signed = parts.shape(place).signed(p);
+    fn new(parts: &'a Parts, p: Vec3, place: usize, signed: f64, enough: f64) -> Self {
         let (value, limit) = (R::value(signed), f64::INFINITY);
-        let reading = PhantomData;
-        let mut search = Self { parts, p, place, signed, value, enough, limit, reading };
-        search.tighten();
-        search
-    }
-
-    /// The nearest primitive and its place.
-    #[inline]
-    pub fn answer(&self) -> (NearestPrimitive, usize) {
-        let primitive = self.parts.primitive(self.place);
-        (NearestPrimitive { signed: self.signed, primitive }, self.place)
+        Self { parts, p, place, signed, value, enough, limit, reading: PhantomData }
     }
 
     /// Sets the limit above the best value by more than both can be rounded; below everything if that value is enough.
@@ -259,46 +240,11 @@ impl<R: Reading> UnionSearch for Nearest<'_, R> {
         let value = R::value(signed);
         if value < self.value
             || (value == self.value
+                && self.place != NO_PLACE
                 && self.parts.primitive(place) < self.parts.primitive(self.place))
         {
             (self.place, self.signed, self.value) = (place, signed, value);
             self.tighten();
-        }
-    }
-}
-
-/// Search for the primitive of least signed distance below a limit, or for any below it.
-struct Below<'a> {
-    parts: &'a Parts,
-    p: Vec3,
-    /// The least distance so far.
-    limit: f64,
-    /// Whether the first one ends the search.
-    any: bool,
-    found: Option<usize>,
-}
-
-impl UnionSearch for Below<'_> {
-    const MEASURE: Measure = Measure::Signed;
-
-    #[inline]
-    fn point(&self) -> Vec3 {
-        self.p
-    }
-
-    #[inline]
-    fn limit(&self) -> f64 {
-        if self.any && self.found.is_some() {
-            return f64::NEG_INFINITY;
-        }
-        self.limit + self.limit.abs() * ROUNDING + self.parts.slack()
-    }
-
-    #[inline]
-    fn look(&mut self, place: usize) {
-        let signed = self.parts.shape(place).signed(self.p);
-        if signed < self.limit && !(self.any && self.found.is_some()) {
-            (self.limit, self.found) = (signed, Some(place));
         }
     }
 }
