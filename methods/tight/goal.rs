@@ -731,13 +731,12 @@ impl Hulls {
         let (weights, centre) = match primitive {
             Primitive::Sphere(v) => ([1.0, 0.0, 0.0], mesh.spheres[v as usize].centre),
             Primitive::Edge(e) => {
-                let foot = self.cones[e as usize].foot(p);
-                let [a, b] = foot.weights;
-                ([a, b, 0.0], foot.sphere.centre)
+                let (sphere, [a, b]) = self.cones[e as usize].nearest_sphere(p);
+                ([a, b, 0.0], sphere.centre)
             }
             Primitive::Face(f) => {
-                let foot = self.slabs[f as usize].foot(p);
-                (foot.weights, foot.sphere.centre)
+                let (sphere, weights) = self.slabs[f as usize].nearest_sphere(p);
+                (weights, sphere.centre)
             }
         };
         let [x, y, z] = (p - centre).normalize_or_zero().to_array();

@@ -532,46 +532,7 @@ fn anchors(centres: &[Vec3]) -> ([Vec3; 4], f64) {
 // <https://doi.org/10.1016/0167-8396(95)00016-Y>: by Alexander duality a complex in the 3-sphere has
 // one void less than its complement has components.
 
-/// The simplices of a dual complex as lists of balls: ascending in each simplex, the lists
-/// themselves in lexicographic order.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Simplices {
-    /// The vertices.
-    pub vertices: Vec<u32>,
-    /// The edges.
-    pub edges: Vec<[u32; 2]>,
-    /// The triangles.
-    pub triangles: Vec<[u32; 3]>,
-    /// The tetrahedra.
-    pub tetrahedra: Vec<[u32; 4]>,
-}
-
-fn ascending<const N: usize>(vertices: [VertexId; N]) -> [u32; N] {
-    let mut ids = vertices.map(|v| v.0);
-    ids.sort_unstable();
-    ids
-}
-
-fn in_order<T: Ord>(simplices: impl Iterator<Item = T>) -> Vec<T> {
-    let mut list: Vec<T> = simplices.collect();
-    list.sort_unstable();
-    list
-}
-
 impl DualComplex<'_> {
-    /// The simplices as lists of balls.
-    pub fn simplices(&self) -> Simplices {
-        let regular = self.regular();
-        Simplices {
-            vertices: self.vertices().map(|(v, _)| v.0).collect(),
-            edges: in_order(self.edges().map(|(e, _)| ascending(self.edge_vertices(e)))),
-            triangles: in_order(
-                self.triangles().map(|(f, _)| ascending(regular.facet_vertices(f))),
-            ),
-            tetrahedra: in_order(self.tetrahedra().map(|c| ascending(regular.vertices(c)))),
-        }
-    }
-
     /// The numbers of vertices, edges, triangles and tetrahedra.
     pub fn counts(&self) -> [usize; 4] {
         [

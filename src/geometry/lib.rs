@@ -94,7 +94,7 @@ pub use dual_complex::DualComplex;
 pub use enclosing::enclosing_ball;
 pub use poles::{PolarBall, Pole, Poles, PowerCrust, SamplePoles};
 pub use regular::Regular;
-pub use sphere::{Cone, ConeFrame, HullFoot, Slab, SlabFace, SlabPlanes, Sphere, separation_angle};
+pub use sphere::{Cone, ConeFrame, Slab, SlabFace, SlabPlanes, Sphere, separation_angle};
 pub use triangles_meet::{TriangleTree, triangles_cross, triangles_meet};
 pub use triangulation::{CellId, TriangulationError, VertexId};
 pub use union_boundary::{MergedVertices, UnionBoundary, UnionVertex};

@@ -1,4 +1,4 @@
-//! The sphere, its signed distance, and the result type shared by sphere, cone and slab.
+//! The medial primitives, sphere, cone and slab, with their signed distances.
 
 use crate::Vec3;
 use crate::planar_frame::PlanarFrame;
@@ -30,53 +30,6 @@ impl Sphere {
     pub fn signed_distance(&self, p: Vec3) -> f64 {
         p.distance(self.centre) - self.radius
     }
-
-    /// Where `p` is nearest to the sphere. From the centre itself every point is nearest, and the
-    /// one in direction `x` is returned.
-    pub fn foot(&self, p: Vec3) -> HullFoot<1> {
-        HullFoot::towards(*self, [1.0], p, || Vec3::X)
-    }
-}
-
-/// The nearest point on the boundary of the convex hull of `N` balls: one ball is a sphere, two a
-/// cone, three a slab.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HullFoot<const N: usize> {
-    /// Signed distance of the query to the hull, negative inside.
-    pub signed_distance: f64,
-    /// The interpolated sphere `sum_i weights[i] m_i` that attains the distance.
-    pub sphere: Sphere,
-    /// Barycentric weights of that sphere over the input spheres: non-negative, of sum 1.
-    pub weights: [f64; N],
-    /// The nearest point, on `sphere` and on the boundary of the hull.
-    pub point: Vec3,
-}
-
-/// The vector from a centre to the query, if shorter than this share of the radius, gives no
-/// direction: its rounding error is too large.
-const SHORT_ARM: f64 = 1e-8;
-
-impl<const N: usize> HullFoot<N> {
-    /// The foot of `p` on the interpolated sphere that attains its distance: on the ray from the
-    /// centre through `p`, or in the direction `apart` if `p` is too close to the centre.
-    pub(super) fn towards(
-        sphere: Sphere,
-        weights: [f64; N],
-        p: Vec3,
-        apart: impl FnOnce() -> Vec3,
-    ) -> Self {
-        let arm = p - sphere.centre;
-        let distance = arm.length();
-        let is_long = distance > 0.0 && distance > SHORT_ARM * sphere.radius;
-        Self::along(sphere, weights, p, if is_long { arm / distance } else { apart() })
-    }
-
-    /// The foot of `p` in a known direction from the centre.
-    pub(super) fn along(sphere: Sphere, weights: [f64; N], p: Vec3, direction: Vec3) -> Self {
-        let signed_distance = sphere.signed_distance(p);
-        let point = sphere.centre + sphere.radius * direction;
-        Self { signed_distance, sphere, weights, point }
-    }
 }
 
 // Signed distance to the convex hull of two balls: the medial cone of an edge.
@@ -107,8 +60,7 @@ impl<const N: usize> HullFoot<N> {
 /// let above = Vec3::new(2.0, 3.0, 0.0);
 /// assert_eq!(rod.signed_distance(above), 2.0);
 /// assert_eq!(rod.signed_distance(2.0 * Vec3::X), -1.0);
-/// let foot = rod.foot(above);
-/// assert_eq!((foot.point, foot.weights), (Vec3::new(2.0, 1.0, 0.0), [0.5, 0.5]));
+/// assert_eq!(rod.nearest_sphere(above), (Sphere::new(2.0 * Vec3::X, 1.0), [0.5, 0.5]));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
@@ -177,7 +129,7 @@ impl Cone {
     }
 
     /// Signed distance of `p` as [`Cone::signed_distance`] has it, and the centre of the
-    /// interpolated sphere that attains it. Cheaper than [`Cone::foot`].
+    /// interpolated sphere that attains it. Cheaper than [`Cone::nearest_sphere`].
     #[inline]
     pub fn nearest_centre(&self, p: Vec3) -> (f64, Vec3) {
         let (tau, squared) = self.best_centre(p);
@@ -195,9 +147,8 @@ impl Cone {
         (tau, (xi - tau) * (xi - tau) + y_squared)
     }
 
-    /// The point of the hull's boundary nearest to `p`. For `p` on the axis a whole circle is
-    /// nearest; one of its points is returned.
-    pub fn foot(&self, p: Vec3) -> HullFoot<2> {
+    /// The interpolated sphere that attains the distance of `p`, and its weights over the two balls: non-negative, of sum 1.
+    pub fn nearest_sphere(&self, p: Vec3) -> (Sphere, [f64; 2]) {
         let (tau, _) = self.best_centre(p);
         let radius = (self.radius + tau * self.slope).max(0.0);
         let sphere = Sphere::new(self.start + tau * self.axis, radius);
@@ -209,15 +160,7 @@ impl Cone {
                 [1.0 - t, t]
             }
         };
-        let Some(frame) = self.frame() else {
-            return HullFoot::towards(sphere, weights, p, || Vec3::X);
-        };
-        if tau <= 0.0 || tau >= self.length {
-            return HullFoot::towards(sphere, weights, p, || frame.normal(frame.v));
-        }
-        // On the lateral take the direction from the axis: near the axis `p - c(t)` is rounding.
-        let across = frame.across(p - self.start).unwrap_or(frame.v);
-        HullFoot::along(sphere, weights, p, frame.normal(across))
+        (sphere, weights)
     }
 
     /// The axis frame from which the tangent planes follow, or `None` when one ball holds the
@@ -259,12 +202,11 @@ const MIN_RELATIVE_HEIGHT: f64 = 1e-10;
 /// assert_eq!(plate.signed_distance(above), 2.0);
 /// assert_eq!(plate.signed_distance(Vec3::new(4.0, -3.0, 0.0)), 2.0);
 /// assert_eq!(plate.signed_distance(Vec3::new(4.0, 2.0, 0.0)), -1.0);
-/// let foot = plate.foot(above);
-/// assert_eq!((foot.point, foot.weights), (Vec3::new(4.0, 2.0, 1.0), [0.25, 0.25, 0.5]));
+/// let (sphere, weights) = plate.nearest_sphere(above);
+/// assert_eq!((sphere.centre, weights), (Vec3::new(4.0, 2.0, 0.0), [0.25, 0.25, 0.5]));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slab {
-    spheres: [Sphere; 3],
     face: Option<SlabFace>,
     /// Cones of the sides 01, 12, 20.
     cones: [Cone; 3],
@@ -274,7 +216,7 @@ impl Slab {
     /// The hull of three balls.
     pub fn new(spheres: [Sphere; 3]) -> Self {
         let cones = [0, 1, 2].map(|k| Cone::new(spheres[k], spheres[(k + 1) % 3]));
-        Self { spheres, face: SlabFace::new(spheres), cones }
+        Self { face: SlabFace::new(spheres), cones }
     }
 
     /// Signed distance of `p` to the boundary of the hull, negative inside: the true distance up to
@@ -286,45 +228,25 @@ impl Slab {
         self.cones.iter().map(|cone| cone.signed_distance(p)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Where `p` is nearest to the boundary of the hull. Of several nearest points one is returned.
-    pub fn foot(&self, p: Vec3) -> HullFoot<3> {
-        if let Some((sphere, weights)) = self.face.as_ref().and_then(|face| face.best_sphere(p)) {
-            return HullFoot::towards(sphere, weights, p, || self.free_direction(sphere));
+    /// The interpolated sphere that attains the distance of `p`, and its weights over the three balls: non-negative, of
+    /// sum 1.
+    pub fn nearest_sphere(&self, p: Vec3) -> (Sphere, [f64; 3]) {
+        if let Some(found) = self.face.as_ref().and_then(|face| face.best_sphere(p)) {
+            return found;
         }
-        let feet = self.cones.map(|cone| cone.foot(p));
+        let nearest = self.cones.map(|cone| cone.nearest_sphere(p));
+        let distances = nearest.map(|(sphere, _)| sphere.signed_distance(p));
         let mut side = 0;
         for k in 1..3 {
-            if feet[k].signed_distance < feet[side].signed_distance {
+            if distances[k] < distances[side] {
                 side = k;
             }
         }
-        let foot = feet[side];
+        let (sphere, of_side) = nearest[side];
         let mut weights = [0.0; 3];
-        weights[side] = foot.weights[0];
-        weights[(side + 1) % 3] = foot.weights[1];
-        HullFoot::towards(foot.sphere, weights, p, || self.free_direction(foot.sphere))
-    }
-
-    /// A direction in which `sphere`, centred on some side, touches the boundary of the hull. Of the
-    /// tangent planes of the slab and some of each cone, the one beyond which the balls reach least.
-    fn free_direction(&self, sphere: Sphere) -> Vec3 {
-        let mut candidates: Vec<Vec3> = self.planes().map_or(vec![], |p| p.normals().to_vec());
-        for (side, cone) in self.cones.iter().enumerate() {
-            let away = sphere.centre - self.spheres[(side + 2) % 3].centre;
-            match cone.frame() {
-                Some(frame) => {
-                    let across = frame.across(away).unwrap_or(frame.v);
-                    let around = [across, frame.u.cross(across), -across];
-                    candidates.extend(around.map(|across| frame.normal(across)));
-                }
-                None => candidates.push(away.try_normalize().unwrap_or(Vec3::X)),
-            }
-        }
-        let oversteps = candidates.into_iter().map(|n| {
-            let reach = self.spheres.iter().map(|m| n.dot(m.centre - sphere.centre) + m.radius);
-            (reach.fold(f64::NEG_INFINITY, f64::max), n)
-        });
-        oversteps.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(Vec3::X, |best| best.1)
+        weights[side] = of_side[0];
+        weights[(side + 1) % 3] = of_side[1];
+        (sphere, weights)
     }
 
     /// The two planes tangent to all three balls from outside, or `None` when there are none:

@@ -255,12 +255,10 @@ fn distances_to_spheres_of_any_size_are_finite() {
                 sphere.radius *= [0.0, 1e-9, 1e-3, 1.0, 1e3][rng.random_range(0..5)];
             }
             for p in queries(&spheres, &mut rng) {
-                let edge = Cone::new(spheres[0], spheres[1]).foot(p);
-                let face = Slab::new([spheres[0], spheres[1], spheres[2]]).foot(p);
-                for (signed, point) in
-                    [(edge.signed_distance, edge.point), (face.signed_distance, face.point)]
-                {
-                    assert!(signed.is_finite() && point.is_finite(), "{class}: {spheres:?} at {p}");
+                let (edge, _) = Cone::new(spheres[0], spheres[1]).nearest_sphere(p);
+                let (face, _) = Slab::new([spheres[0], spheres[1], spheres[2]]).nearest_sphere(p);
+                for sphere in [edge, face] {
+                    assert!(sphere.signed_distance(p).is_finite(), "{class}: {spheres:?} at {p}");
                 }
                 let oracle = brute_force(&spheres, p);
                 let off = (signed(&spheres, p) - oracle).abs() / scale(&spheres, p);
@@ -281,16 +279,15 @@ fn any_class() -> impl Strategy<Value = (Spheres, Vec3, u64)> {
     })
 }
 
-/// The nearest point as found by the public `foot`: signed distance, sphere, point, weights.
-fn foot(spheres: &[Sphere], p: Vec3) -> (f64, Sphere, Vec3, Vec<f64>) {
+fn nearest_sphere(spheres: &[Sphere], p: Vec3) -> (Sphere, Vec<f64>) {
     match *spheres {
         [a, b] => {
-            let f = Cone::new(a, b).foot(p);
-            (f.signed_distance, f.sphere, f.point, f.weights.to_vec())
+            let (sphere, weights) = Cone::new(a, b).nearest_sphere(p);
+            (sphere, weights.to_vec())
         }
         [a, b, c] => {
-            let f = Slab::new([a, b, c]).foot(p);
-            (f.signed_distance, f.sphere, f.point, f.weights.to_vec())
+            let (sphere, weights) = Slab::new([a, b, c]).nearest_sphere(p);
+            (sphere, weights.to_vec())
         }
         _ => unreachable!("two or three spheres"),
     }
@@ -368,11 +365,9 @@ proptest! {
     }
 
     #[test]
-    fn feet_are_nearest_and_on_the_boundary((spheres, p, _) in any_class()) {
-        let (distance, m, point, weights) = foot(&spheres, p);
-        prop_assert!((distance - signed(&spheres, p)).abs() <= 1e-12);
-        prop_assert!((point.distance(p) - distance.abs()).abs() <= 1e-12);
-        prop_assert!(signed(&spheres, point).abs() <= 1e-6, "{}", signed(&spheres, point));
+    fn nearest_spheres_attain_the_distance_and_have_their_weights((spheres, p, _) in any_class()) {
+        let (m, weights) = nearest_sphere(&spheres, p);
+        prop_assert!((m.signed_distance(p) - signed(&spheres, p)).abs() <= 1e-12);
         prop_assert!(weights.iter().all(|&w| w >= 0.0));
         prop_assert!((weights.iter().sum::<f64>() - 1.0).abs() <= 1e-12);
         let thin = spheres.len() == 3
@@ -383,15 +378,6 @@ proptest! {
             let radius: f64 = spheres.iter().zip(&weights).map(|(m, w)| m.radius * w).sum();
             prop_assert!(centre.distance(m.centre) <= 1e-9);
             prop_assert!((radius - m.radius).abs() <= 1e-9);
-        }
-    }
-
-    #[test]
-    fn feet_from_centres_are_on_the_boundary((spheres, _, seed) in any_class()) {
-        for p in queries(&spheres, &mut Pcg64::seed_from_u64(seed)) {
-            let (distance, _, point, _) = foot(&spheres, p);
-            let off = signed(&spheres, point).abs();
-            prop_assert!(off <= 1e-6 * scale(&spheres, p), "off {off:e} of {distance} at {p}");
         }
     }
 }
