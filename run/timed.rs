@@ -76,10 +76,9 @@ impl From<SimplifyError> for Fault {
             SimplifyError::InvalidOutput(_) => Status::InvalidOutput,
             SimplifyError::OutOfMemory(_) => Status::OutOfMemory,
             SimplifyError::Crashed(_) => Status::Panicked,
-            SimplifyError::Shape(_)
-            | SimplifyError::Hierarchy(_)
-            | SimplifyError::Failed(_)
-            | SimplifyError::Cancelled => Status::Failed,
+            SimplifyError::Shape(_) | SimplifyError::Failed(_) | SimplifyError::Cancelled => {
+                Status::Failed
+            }
         };
         Self { status, reason: error.to_string() }
     }

@@ -23,6 +23,17 @@ pub struct RangeQueue<T> {
     from: Vec<T>,
     /// The items of each of them.
     ranges: Vec<Vec<T>>,
+    /// Number of items, including outdated ones that were not dropped yet.
+    len: usize,
+    /// With more items than this all outdated ones are dropped, to bound the memory.
+    prune_above: usize,
+}
+
+impl<T: Ord> Default for RangeQueue<T> {
+    fn default() -> Self {
+        let (lowest, from, ranges) = (BinaryHeap::new(), Vec::new(), Vec::new());
+        Self { lowest, from, ranges, len: 0, prune_above: LARGE }
+    }
 }
 
 /// Items from which on a range is split before it becomes a heap.
@@ -33,16 +44,18 @@ const MAX_PIECES: usize = 4096;
 const PER_BOUND: usize = 8;
 
 impl<T: Ord + Copy> RangeQueue<T> {
-    /// A queue of some items.
+    /// A queue of some items. Cost `O(n)`.
     pub fn new(items: Vec<T>) -> Self {
-        let mut queue = Self { lowest: BinaryHeap::new(), from: Vec::new(), ranges: Vec::new() };
+        let mut queue = Self { len: items.len(), ..Self::default() };
         queue.fill(items);
+        queue.note_size();
         queue
     }
 
     /// Adds an item.
     #[inline]
     pub fn push(&mut self, item: T) {
+        self.len += 1;
         match self.range_of(item) {
             Some(range) => self.ranges[range].push(item),
             None => self.lowest.push(Reverse(item)),
@@ -50,10 +63,17 @@ impl<T: Ord + Copy> RangeQueue<T> {
     }
 
     /// Removes the least item that is up to date. `present` returns for an item its present form: the same, a
-    /// larger one, or none.
+    /// larger one, or none. A none is final.
+    ///
+    /// After a call the queue holds at most a constant plus three times the items that were left when outdated ones were
+    /// last dropped.
     pub fn pop(&mut self, present: impl Fn(T) -> Option<T>) -> Option<T> {
+        if self.len > self.prune_above {
+            self.drop_outdated(|item| present(item).is_some());
+        }
         loop {
             while let Some(Reverse(item)) = self.lowest.pop() {
+                self.len -= 1;
                 match present(item) {
                     Some(now) if now == item => return Some(item),
                     Some(now) => self.push(now),
@@ -62,8 +82,10 @@ impl<T: Ord + Copy> RangeQueue<T> {
             }
             let range = self.ranges.pop()?;
             self.from.pop();
+            self.len -= range.len();
             let mut lowest: Vec<T> = Vec::with_capacity(range.len());
             for item in range.into_iter().filter_map(&present) {
+                self.len += 1;
                 match self.range_of(item) {
                     Some(range) => self.ranges[range].push(item),
                     None => lowest.push(item),
@@ -71,6 +93,19 @@ impl<T: Ord + Copy> RangeQueue<T> {
             }
             self.fill(lowest);
         }
+    }
+
+    fn drop_outdated(&mut self, is_left: impl Fn(T) -> bool) {
+        self.lowest.retain(|&Reverse(item)| is_left(item));
+        // A range may become empty; its bound still holds for later items.
+        self.ranges.iter_mut().for_each(|range| range.retain(|&item| is_left(item)));
+        self.len = self.lowest.len() + self.ranges.iter().map(Vec::len).sum::<usize>();
+        self.note_size();
+    }
+
+    /// Three times the size: then the cost of dropping is constant per item pushed.
+    fn note_size(&mut self) {
+        self.prune_above = LARGE + 3 * self.len;
     }
 
     /// Makes a heap of a range that is the lowest one now, or of the lowest part of it.
@@ -152,6 +187,19 @@ mod tests {
             }
         }
         assert!(popped > 20_000, "{popped}");
+    }
+
+    /// Outdated items do not pile up.
+    #[test]
+    fn the_memory_is_bounded() {
+        let mut queue = RangeQueue::new(vec![(0, 0)]);
+        for id in 0..1_000_000_u32 {
+            assert_eq!(queue.pop(|item| (item.1 == id).then_some(item)), Some((0, id)));
+            // Far behind current items, so that it is never popped.
+            (0..4).for_each(|extra| queue.push((1_000 + extra, id)));
+            queue.push((0, id + 1));
+            assert!(queue.len < 3 * LARGE, "{}", queue.len);
+        }
     }
 
     #[test]

@@ -60,7 +60,7 @@ use medial::range_queue::RangeQueue;
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
     Capability, Diagnostics, Extras, Level, Method, MethodInfo, NativeLevel, NoParams, RunContext,
-    Simplification, Simplified, SimplifyError,
+    Simplification, Simplified,
 };
 use rayon::prelude::*;
 
@@ -102,9 +102,7 @@ fn prepare<'s>(shape: &'s Shape, _: NoParams, run: &RunContext) -> Prepared<'s> 
     }
     run.step(0, initial.spheres.len())?;
     let steps = contract(&initial, run)?;
-    let hierarchy = Hierarchy::new(initial, steps)
-        .map_err(|error| SimplifyError::Hierarchy(error.to_string()))?;
-    Ok(Box::new(Levels::new(Arc::new(hierarchy))))
+    Ok(Box::new(Levels::new(Arc::new(Hierarchy::new(initial, steps)))))
 }
 
 /// A hierarchy and the scales of its levels.
@@ -143,7 +141,6 @@ impl Levels {
         let mut diagnostics = Diagnostics::default();
         let infinite = stage - self.scales[..stage].partition_point(|cost| cost.is_finite());
         diagnostics.count("collapses", stage);
-        diagnostics.count("against_link_condition", self.hierarchy.violations_until(stage));
         diagnostics.count("beyond_every_finite_scale", infinite);
         let spheres = self.hierarchy.initial().spheres.len();
         match level {
@@ -235,7 +232,7 @@ impl Candidate {
 /// bounded in the mean.
 ///
 /// # Errors
-/// [`SimplifyError::Cancelled`] when the run was cancelled.
+/// [`Cancelled`](medial::simplifier::SimplifyError::Cancelled) when the run was cancelled.
 fn contract(mesh: &MedialMesh, run: &RunContext) -> Result<Vec<Step>> {
     let spheres = &mesh.spheres;
     let total = spheres.len();

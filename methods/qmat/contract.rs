@@ -117,7 +117,7 @@ impl Contraction {
         let mut all: Vec<_> = edges
             .map(|ends| candidate(&self.complex, &self.quadrics, &self.params, ends))
             .collect();
-        all.sort_by(Candidate::order);
+        all.sort();
         all
     }
 
@@ -196,7 +196,7 @@ impl Contraction {
             }
             let dearer = priced(&self.complex, &self.params, [a, b], error);
             // When it comes back at this cost, it is no dearer than itself and is collapsed.
-            if candidate.is_before(&dearer) {
+            if candidate < dearer {
                 return Decision::Postpone(dearer);
             }
             return Decision::Collapse(sphere);

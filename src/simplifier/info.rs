@@ -117,11 +117,6 @@ impl MethodInfo {
         self.extras.push(extra);
         self
     }
-
-    /// Whether the results carry an extra of this name.
-    pub fn has_extra(&self, name: &str) -> bool {
-        self.extras.iter().any(|extra| extra.name == name)
-    }
 }
 
 /// The scalar that a method is controlled by in its paper.

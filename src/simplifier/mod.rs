@@ -306,13 +306,11 @@ impl RunContext {
 
 /// Why a method gave no result.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum SimplifyError {
     /// The method does not support this: not a failure.
     #[error("unsupported: {why}")]
-    Unsupported {
-        /// The missing feature, and the alternative.
-        why: String,
-    },
+    Unsupported { why: String },
     /// A parameter is unknown, of the wrong type or out of range.
     #[error("parameter: {0}")]
     Parameter(String),
@@ -325,9 +323,6 @@ pub enum SimplifyError {
     /// The method returned something that is no valid complex.
     #[error("invalid output: {0}")]
     InvalidOutput(String),
-    /// A hierarchy cannot be built, or belongs to another method.
-    #[error("hierarchy: {0}")]
-    Hierarchy(String),
     /// The method failed, with its message.
     #[error("failed: {0}")]
     Failed(String),

@@ -3,37 +3,9 @@
 use super::CollapseComplex;
 
 impl CollapseComplex {
-    /// Whether `Lk(a) ∩ Lk(b) = Lk(ab)` for the edge `{a, b}`: then its collapse keeps the homotopy
-    /// type of the complex.
-    ///
-    /// In a complex of dimension two this is the conjunction of two tests:
-    /// - T1: every vertex `c` adjacent to both ends has the face `{a, b, c}`; otherwise the collapse
-    ///   fills a hole bounded by three edges.
-    /// - T2: no edge `{c, d}` has both faces `{a, c, d}` and `{b, c, d}`; otherwise the collapse
-    ///   fills a void bounded by faces.
-    ///
-    /// Source: Dey, Edelsbrunner, Guha, Nekhayev 1999, *Topology preserving edge contraction*,
-    /// Publ. Inst. Math. 66. Cost: the two links.
-    pub fn link_condition(&mut self, a: u32, b: u32) -> bool {
-        self.find_shared(a, b);
-        if !self.shared.is_empty() {
-            return false;
-        }
-        self.unmark_roots(a, b);
-        !self.neighbours(b).iter().any(|&c| self.marks.contains(c))
-    }
-
-    /// Unmarks the third vertices of the faces at the edge. The common neighbours that stay marked
-    /// have no face with it.
-    fn unmark_roots(&mut self, a: u32, b: u32) {
-        let sides = self.side_pool.get(self.sides[b as usize]);
-        for &[p, q] in sides.iter().filter(|side| side.contains(&a)) {
-            self.marks.remove(if p == a { q } else { p });
-        }
-    }
-
-    /// Whether the link condition holds after elementary expansions: a weaker condition on the edge
-    /// `{a, b}` under which its collapse still keeps the homotopy type.
+    /// Whether the link condition `Lk(a) ∩ Lk(b) = Lk(ab)` of the edge `{a, b}` (Dey, Edelsbrunner, Guha, Nekhayev 1999,
+    /// *Topology preserving edge contraction*, Publ. Inst. Math. 66) holds after elementary expansions: a weaker condition
+    /// under which its collapse still keeps the homotopy type.
     ///
     /// The vertices and edges of `Lk(a) ∩ Lk(b)` form a graph; call its vertices in `Lk(ab)` *roots*.
     /// The condition: each component of the graph is a tree with exactly one root. The link condition
@@ -49,7 +21,11 @@ impl CollapseComplex {
     /// Cost: the two links, and the square of their intersection.
     pub fn keeps_homotopy(&mut self, a: u32, b: u32) -> bool {
         self.find_shared(a, b);
-        self.unmark_roots(a, b);
+        // The common neighbours that stay marked have no face with the edge.
+        let sides = self.side_pool.get(self.sides[b as usize]);
+        for &[p, q] in sides.iter().filter(|side| side.contains(&a)) {
+            self.marks.remove(if p == a { q } else { p });
+        }
         let Self { marks, shared, .. } = self;
         let around = self.neighbour_pool.get(self.neighbours[b as usize]);
         let mut unreached = around.iter().filter(|&&c| marks.contains(c)).count();

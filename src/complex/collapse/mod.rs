@@ -27,7 +27,7 @@
 //! Every vertex has a stamp, which grows with each collapse at the vertex itself. A queued candidate
 //! remembers the stamps of its edge; if they differ when it is popped, it is out of date and dropped.
 
-pub use hierarchy::{Hierarchy, HierarchyError, Step};
+pub use hierarchy::{Hierarchy, Step};
 pub use link::CollapseError;
 pub use queue::{Candidate, CollapseQueue};
 use queue::{List, Pool};
@@ -268,7 +268,7 @@ impl CollapseComplex {
     ///
     /// Edges and faces that become equal are merged. Faces with both ends vanish; an edge that
     /// loses its last face stays as a lone edge unless it is merged. Nothing is tested here:
-    /// [`CollapseComplex::link_condition`] and [`CollapseComplex::folded_face`] are the caller's.
+    /// [`CollapseComplex::keeps_homotopy`] and [`CollapseComplex::folded_face`] are the caller's.
     /// Cheapest when `removed` has the smaller star. Cost: the stars of both ends and the lists of
     /// the neighbours of `removed`.
     ///

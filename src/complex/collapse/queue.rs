@@ -3,9 +3,12 @@
 use std::cmp::Ordering;
 
 use super::CollapseComplex;
+use crate::range_queue::RangeQueue;
 
 /// An edge with its cost at the time the candidate was made.
-#[derive(Clone, Copy, Debug, PartialEq)]
+///
+/// In the order in which candidates come out of a queue: smaller cost, then smaller second key, then smaller ids.
+#[derive(Clone, Copy, Debug)]
 pub struct Candidate {
     cost: f64,
     tie: f64,
@@ -22,7 +25,6 @@ impl Candidate {
     #[inline]
     pub fn new(complex: &CollapseComplex, [a, b]: [u32; 2], cost: f64, tie: f64) -> Self {
         let stamp = complex.stamp(a, b).expect("both ends are left");
-        // `is_before` compares with `<`, which is a total order only without not-a-number.
         let [cost, tie] = [cost, tie].map(|key| if key.is_nan() { f64::INFINITY } else { key });
         Self { cost, tie, ends: [a.min(b), a.max(b)], stamp }
     }
@@ -42,30 +44,40 @@ impl Candidate {
     pub fn is_current(&self, complex: &CollapseComplex) -> bool {
         complex.stamp(self.ends[0], self.ends[1]) == Some(self.stamp)
     }
+}
 
-    /// Whether this candidate comes out of a queue before another; see [`Candidate::order`].
+impl Ord for Candidate {
     #[inline]
-    pub fn is_before(&self, other: &Self) -> bool {
+    fn cmp(&self, other: &Self) -> Ordering {
         // Costs almost always differ: one comparison then decides in the inner loop of the heap.
         if self.cost != other.cost {
-            return self.cost < other.cost;
+            return self.cost.total_cmp(&other.cost);
         }
-        self.order(other) == Ordering::Less
-    }
-
-    /// The order in which candidates come out of a queue: smaller cost, then smaller second key,
-    /// then smaller ids.
-    pub fn order(&self, other: &Self) -> Ordering {
         let keys = self.cost.total_cmp(&other.cost).then(self.tie.total_cmp(&other.tie));
-        keys.then(self.ends.cmp(&other.ends))
+        keys.then(self.ends.cmp(&other.ends)).then(self.stamp.cmp(&other.stamp))
     }
 }
+
+impl PartialOrd for Candidate {
+    #[inline]
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Candidate {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Candidate {}
 
 /// A priority queue of candidates: smallest cost first, then the second key, then the ids.
 /// Equal contents come out in the same order for any history.
 #[derive(Clone, Debug, Default)]
 pub struct CollapseQueue {
-    heap: LazyHeap,
+    waiting: RangeQueue<Candidate>,
     /// Rejected candidates, in the order in which they were set aside; `None` once woken.
     parked: Vec<Option<Candidate>>,
     /// For each vertex the parked candidates that it is an obstacle of; grown on demand.
@@ -75,25 +87,24 @@ pub struct CollapseQueue {
 impl CollapseQueue {
     /// A queue of the given candidates. Cost `O(n)`.
     pub fn from_candidates(candidates: Vec<Candidate>) -> Self {
-        Self { heap: LazyHeap::from_items(candidates), ..Self::default() }
+        Self { waiting: RangeQueue::new(candidates), ..Self::default() }
     }
 
     /// Adds a candidate.
     #[inline]
     pub fn push(&mut self, candidate: Candidate) {
-        self.heap.push(candidate);
+        self.waiting.push(candidate);
     }
 
     /// Takes the first candidate that is still current.
     pub fn pop(&mut self, complex: &CollapseComplex) -> Option<Candidate> {
-        self.heap.pop(|candidate| candidate.is_current(complex))
+        self.waiting.pop(|candidate| candidate.is_current(complex).then_some(candidate))
     }
 
     /// The first candidate that is still current, without taking it: the one that the next
     /// [`CollapseQueue::pop`] will return.
     pub fn peek(&mut self, complex: &CollapseComplex) -> Option<Candidate> {
         let first = self.pop(complex)?;
-        // It is before every pivot, so it goes back into the heap and not into a group.
         self.push(first);
         Some(first)
     }
@@ -120,191 +131,9 @@ impl CollapseQueue {
             // Another obstacle may have woken it.
             let candidate = self.parked[id as usize].take();
             if let Some(candidate) = candidate.filter(|candidate| candidate.is_current(complex)) {
-                self.heap.push(candidate);
+                self.waiting.push(candidate);
             }
         }
-    }
-}
-
-/// The heap is refilled with at most this many items at a time, few enough for the cache.
-const HEAP_SIZE: usize = 1 << 12;
-
-/// While a group is too large for the heap, a refill keeps its first `1 / SHARE` and splits off the
-/// rest.
-const SHARE: usize = 8;
-
-/// A priority queue that sorts late and forgets early.
-///
-/// Only the first items are in a heap. The others wait in groups: the groups are ordered, the items
-/// of one group are not. When the heap is empty, the next group replaces it: its outdated items are
-/// dropped, and its later items are split off into new groups, as quicksort would. So most items are
-/// never sorted at all. Items that compare as equal must be identical: then the order in which
-/// items come out depends on the contents of the queue alone, not on its history.
-#[derive(Clone, Debug)]
-struct LazyHeap {
-    /// A heap with four children per node, which lie side by side in memory.
-    near: Vec<Candidate>,
-    /// The groups, the next one last.
-    far: Vec<Group>,
-    /// Number of items in the groups.
-    waiting: usize,
-    /// With more items than this all outdated ones are dropped, to bound the memory.
-    prune_above: usize,
-}
-
-/// Waiting items.
-#[derive(Clone, Debug)]
-struct Group {
-    items: Vec<Candidate>,
-    /// Pivot: every item of this group is >= it, every item due earlier is < it.
-    from: Candidate,
-}
-
-impl Default for LazyHeap {
-    fn default() -> Self {
-        Self { near: Vec::new(), far: Vec::new(), waiting: 0, prune_above: HEAP_SIZE }
-    }
-}
-
-impl LazyHeap {
-    /// A queue of the given items. Cost `O(n)`.
-    fn from_items(items: Vec<Candidate>) -> Self {
-        let mut queue = Self::default();
-        queue.refill(items);
-        queue.note_size();
-        queue
-    }
-
-    /// Adds an item.
-    #[inline]
-    fn push(&mut self, item: Candidate) {
-        match self.far.last() {
-            // Only an item before every pivot may go into the heap, which is emptied first.
-            Some(next) if !item.is_before(&next.from) => self.push_far(item),
-            _ => {
-                self.near.push(item);
-                self.sift_up(self.near.len() - 1);
-            }
-        }
-    }
-
-    fn push_far(&mut self, item: Candidate) {
-        // Pivots descend along `far`: the first group that does not start after the item is its own.
-        let group = self.far.partition_point(|group| item.is_before(&group.from));
-        self.far[group].items.push(item);
-        self.waiting += 1;
-    }
-
-    /// Number of items, including outdated ones that were not dropped yet.
-    fn len(&self) -> usize {
-        self.near.len() + self.waiting
-    }
-
-    /// Takes the first item that is still current. An item that was outdated once must stay so.
-    ///
-    /// After a call the queue holds at most a constant plus three times the items that were current
-    /// when outdated ones were last dropped.
-    fn pop(&mut self, is_current: impl Fn(&Candidate) -> bool) -> Option<Candidate> {
-        if self.len() > self.prune_above {
-            self.drop_outdated(&is_current);
-        }
-        loop {
-            while let Some(first) = self.pop_near() {
-                if is_current(&first) {
-                    return Some(first);
-                }
-            }
-            let mut group = self.far.pop()?.items;
-            self.waiting -= group.len();
-            // Before any sorting, since most of the group is usually outdated by now.
-            group.retain(&is_current);
-            self.refill(group);
-        }
-    }
-
-    fn drop_outdated(&mut self, is_current: &impl Fn(&Candidate) -> bool) {
-        // A group may become empty; its pivot still bounds later items.
-        self.near.retain(is_current);
-        self.heapify();
-        for group in &mut self.far {
-            group.items.retain(is_current);
-        }
-        self.waiting = self.far.iter().map(|group| group.items.len()).sum();
-        self.note_size();
-    }
-
-    /// Three times the size: then the cost of dropping is constant per item pushed.
-    fn note_size(&mut self) {
-        self.prune_above = HEAP_SIZE + 3 * self.len();
-    }
-
-    /// Fills the empty heap with the first of `items`; the others become the next groups.
-    fn refill(&mut self, mut items: Vec<Candidate>) {
-        // The latest group is split off first, so the earliest ends up last in `far`.
-        while items.len() > HEAP_SIZE {
-            let share = (HEAP_SIZE / 2).max(items.len() / SHARE);
-            let (_, &mut from, _) = items.select_nth_unstable_by(share, Candidate::order);
-            let group = items.split_off(share);
-            self.waiting += group.len();
-            self.far.push(Group { items: group, from });
-        }
-        self.near = items;
-        self.heapify();
-    }
-
-    fn pop_near(&mut self) -> Option<Candidate> {
-        let last = self.near.pop()?;
-        let Some(first) = self.near.first().copied() else {
-            return Some(last);
-        };
-        // The last leaf fills the gap at the root and sinks to its place.
-        self.near[0] = last;
-        self.sift_down(0);
-        Some(first)
-    }
-
-    fn heapify(&mut self) {
-        // From the last parents to the root: linear in total. Leaves beyond need nothing.
-        for index in (0..self.near.len().div_ceil(4)).rev() {
-            self.sift_down(index);
-        }
-    }
-
-    #[inline]
-    fn sift_up(&mut self, mut index: usize) {
-        let moving = self.near[index];
-        while index > 0 {
-            let parent = (index - 1) / 4;
-            if !moving.is_before(&self.near[parent]) {
-                break;
-            }
-            self.near[index] = self.near[parent];
-            index = parent;
-        }
-        self.near[index] = moving;
-    }
-
-    fn sift_down(&mut self, mut index: usize) {
-        let heap = self.near.as_mut_slice();
-        let moving = heap[index];
-        loop {
-            let first = 4 * index + 1;
-            if first >= heap.len() {
-                break;
-            }
-            let mut least = first;
-            for child in first + 1..heap.len().min(first + 4) {
-                if heap[child].is_before(&heap[least]) {
-                    least = child;
-                }
-            }
-            if !heap[least].is_before(&moving) {
-                break;
-            }
-            heap[index] = heap[least];
-            index = least;
-        }
-        heap[index] = moving;
     }
 }
 
@@ -433,60 +262,7 @@ impl<T: Copy + Default> Pool<T> {
 
 #[cfg(test)]
 mod tests {
-    use rand::{RngExt, SeedableRng};
-    use rand_pcg::Pcg64;
-
     use super::*;
-
-    /// A candidate with a cost and an id.
-    fn item(cost: u32, id: u32) -> Candidate {
-        Candidate { cost: f64::from(cost), tie: 0.0, ends: [id, id], stamp: 0 }
-    }
-
-    /// Against a sorted set, with far more items than the heap takes at a time, most of which are
-    /// out of date when their turn comes, and many new ones before those that wait.
-    #[test]
-    fn items_come_out_in_order_and_only_current_ones() {
-        let mut random = Pcg64::seed_from_u64(3);
-        let items: Vec<_> = (0..40_000).map(|id| (random.random_range(0..9_000_u32), id)).collect();
-        let mut expected: std::collections::BTreeSet<_> = items.iter().copied().collect();
-        let items = items.into_iter().map(|(cost, id)| item(cost, id));
-        let mut queue = LazyHeap::from_items(items.collect());
-        let mut outdated = vec![false; 200_000];
-        for id in 40_000.. {
-            for _ in 0..random.random_range(0..4) {
-                let gone = random.random_range(0..id) as usize;
-                outdated[gone] = true;
-            }
-            if (id as usize) < outdated.len() && random.random_bool(0.7) {
-                let cost = random.random_range(0..9_000);
-                expected.insert((cost, id));
-                queue.push(item(cost, id));
-            }
-            let popped = queue.pop(|item| !outdated[item.ends[0] as usize]);
-            let mut rest = std::iter::from_fn(|| expected.pop_first());
-            let first = rest.find(|item| !outdated[item.1 as usize]);
-            assert_eq!(popped, first.map(|(cost, id)| item(cost, id)));
-            if popped.is_none() {
-                break;
-            }
-        }
-        assert_eq!(queue.len(), 0);
-    }
-
-    /// Outdated items do not pile up.
-    #[test]
-    fn the_memory_is_bounded() {
-        let mut queue = LazyHeap::default();
-        queue.push(item(0, 0));
-        for id in 0..1_000_000_u32 {
-            assert_eq!(queue.pop(|item| item.ends[0] == id), Some(item(0, id)));
-            // Far behind current items, so that it is never popped.
-            (0..4).for_each(|extra| queue.push(item(1_000 + extra, id)));
-            queue.push(item(0, id + 1));
-            assert!(queue.len() < 3 * HEAP_SIZE, "{}", queue.len());
-        }
-    }
 
     #[test]
     fn lists_grow_past_their_blocks_and_blocks_are_used_again() {
