@@ -52,6 +52,7 @@ pub struct UnionSurface {
 
 /// Why there is no surface.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum ContourError {
     /// The medial mesh has no union.
     #[error(transparent)]
@@ -63,28 +64,13 @@ pub enum ContourError {
     #[error(
         "tolerance {tolerance:e}: needs more than {most} tetrahedra, or too fine ones; {feasible:e} is feasible"
     )]
-    TooFine {
-        /// The requested tolerance, in the unit of the mesh.
-        tolerance: f64,
-        /// The most tetrahedra that are taken.
-        most: usize,
-        /// A tolerance that is feasible, in the unit of the mesh.
-        feasible: f64,
-    },
+    TooFine { tolerance: f64, most: usize, feasible: f64 },
     /// No part of the union is thick enough.
     #[error("no part of the union is as thick as {smallest:e}; use a tolerance below {feasible:e}")]
-    TooThin {
-        /// The smallest tetrahedron.
-        smallest: f64,
-        /// A tolerance that would show the largest sphere.
-        feasible: f64,
-    },
+    TooThin { smallest: f64, feasible: f64 },
     /// All radii are zero.
     #[error("all spheres have radius zero: their union has no inside")]
     NoInside,
-    /// It was stopped.
-    #[error("cancelled")]
-    Cancelled,
 }
 
 /// Tetrahedra's edges as a share of the tolerance; contraction takes the rest.
@@ -123,20 +109,17 @@ const MAX_TETRAHEDRA: usize = 50_000_000;
 /// When the mesh has no union, the tolerance is not positive, or so fine that more than 50 million
 /// tetrahedra would be needed, and when nothing is thick enough to show.
 pub fn union_surface(mesh: &MedialMesh, tolerance: f64) -> Result<UnionSurface, ContourError> {
-    union_surface_while(mesh, tolerance, MAX_TETRAHEDRA, || true)
+    union_surface_within(mesh, tolerance, MAX_TETRAHEDRA)
 }
 
-/// [`union_surface`] with at most `most` tetrahedra, of some 80 bytes each, for as long as `go_on`
-/// returns true. It is called every few ten thousand vertices: of a
-/// [`RunContext`](crate::simplifier::RunContext), `|| run.step(0, 1).is_ok()`.
+/// [`union_surface`] with at most `most` tetrahedra, of some 80 bytes each.
 ///
 /// # Errors
-/// As [`union_surface`], and [`ContourError::Cancelled`] if it was stopped.
-pub fn union_surface_while(
+/// As [`union_surface`].
+pub fn union_surface_within(
     mesh: &MedialMesh,
     tolerance: f64,
     most: usize,
-    mut go_on: impl FnMut() -> bool,
 ) -> Result<UnionSurface, ContourError> {
     let union = MedialUnion::new(mesh)?;
     if !(tolerance > 0.0 && tolerance.is_finite()) {
@@ -165,16 +148,12 @@ pub fn union_surface_while(
             size > longest.min(radius.max(smallest))
                 && values.iter().all(|v| v.signed.abs() <= size)
         },
-        &mut go_on,
     );
-    refined.map_err(|unfinished| match unfinished {
-        Unfinished::TooMany { generation, leaves } => {
-            // Feasible even if everything is thin and refined as far as possible.
-            let size = sizes[usize::from(generation)] / MIN_SHARE_OF_CELL;
-            let feasible = size / EDGE_SHARE * f64::max(1.0, (leaves as f64 / most as f64).sqrt());
-            ContourError::TooFine { tolerance, most, feasible }
-        }
-        Unfinished::Stopped => ContourError::Cancelled,
+    refined.map_err(|TooMany { generation, leaves }| {
+        // Feasible even if everything is thin and refined as far as possible.
+        let size = sizes[usize::from(generation)] / MIN_SHARE_OF_CELL;
+        let feasible = size / EDGE_SHARE * f64::max(1.0, (leaves as f64 / most as f64).sqrt());
+        ContourError::TooFine { tolerance, most, feasible }
     })?;
     if sizes[usize::from(goal)] > longest {
         let feasible = sizes[usize::from(goal)] / EDGE_SHARE;
@@ -187,10 +166,9 @@ pub fn union_surface_while(
         return Err(ContourError::TooThin { smallest, feasible });
     }
     let limits: Vec<f64> = edges.iter().map(|length| CONTRACTED * length).collect();
-    let contracted = contract_short_edges(&raw, &limits, Folds::Refused, go_on);
-    let mesh_of = contracted.ok_or(ContourError::Cancelled)?.mesh;
+    let surface = contract_short_edges(&raw, &limits, Folds::Refused).mesh;
     let lost = mesh.spheres.iter().filter(|m| m.radius < smallest).count();
-    Ok(UnionSurface { mesh: mesh_of, tetrahedra: grid.leaves.len(), lost, smallest })
+    Ok(UnionSurface { mesh: surface, tetrahedra: grid.leaves.len(), lost, smallest })
 }
 
 /// A cube with the union in its inside. It is off centre by odd fractions, so that symmetric unions do not
@@ -445,21 +423,13 @@ struct Bisection {
     vertex_at: HashMap<u64, u32, BuildHasherDefault<KeyHasher>>,
 }
 
-/// Why the subdivision is not finished.
-enum Unfinished {
-    /// It has more tetrahedra than are allowed, or would have many times as many.
-    TooMany {
-        /// Bisections of the finest one when that was found.
-        generation: u8,
-        /// Tetrahedra then.
-        leaves: usize,
-    },
-    /// It was stopped.
-    Stopped,
+/// The subdivision has more tetrahedra than allowed, or would have many times as many.
+struct TooMany {
+    /// Bisections of the finest one when that was found.
+    generation: u8,
+    /// Tetrahedra then.
+    leaves: usize,
 }
-
-/// Vertices that are evaluated between two calls of `go_on`.
-const CHUNK: usize = 1 << 16;
 
 /// Refinement gives up early if the predicted number of tetrahedra exceeds the limit by this factor.
 const HOPELESS: f64 = 8.0;
@@ -506,30 +476,23 @@ impl Bisection {
     }
 
     /// Bisects until no tetrahedron is wanted and all are conforming. `values` gives the values at
-    /// new vertices, `goal` is the generation that is wanted everywhere at the boundary. `go_on` is called
-    /// in every round, for every [`CHUNK`] of vertices.
+    /// new vertices, `goal` is the generation that is wanted everywhere at the boundary.
     ///
     /// # Errors
     /// When there are more than `most` tetrahedra, or will be by far: near a surface, three bisections
-    /// make four of one. When `go_on` stops it.
+    /// make four of one.
     fn refine(
         &mut self,
         goal: u8,
         most: usize,
         values: impl Fn(&[Vec3]) -> Vec<Value>,
         wanted: impl Fn(&Leaf, [Value; 4]) -> bool + Sync,
-        mut go_on: impl FnMut() -> bool,
-    ) -> Result<(), Unfinished> {
+    ) -> Result<(), TooMany> {
         let mut finest = 0;
         loop {
             let new: Vec<Vec3> =
                 (self.values.len()..self.keys.len()).map(|v| self.position(v as u32)).collect();
-            for chunk in new.chunks(CHUNK) {
-                if !go_on() {
-                    return Err(Unfinished::Stopped);
-                }
-                self.values.extend(values(chunk));
-            }
+            self.values.extend(values(&new));
             let chunks = self.leaves.par_iter().with_min_len(1 << 12);
             let split: Vec<(bool, bool)> = chunks
                 .map(|leaf| {
@@ -547,7 +510,7 @@ impl Bisection {
             let foreseen = if finest < FORESIGHT { 0.0 } else { more as f64 * to_come.exp2() };
             let leaves = self.leaves.len() + more;
             if leaves > most || foreseen > HOPELESS * most as f64 {
-                return Err(Unfinished::TooMany { generation: finest, leaves });
+                return Err(TooMany { generation: finest, leaves });
             }
             self.round += 1;
             let old = std::mem::take(&mut self.leaves);
@@ -642,7 +605,7 @@ mod tests {
             let size = sizes[usize::from(leaf.generation)];
             size > smallest && values.iter().all(|v| v.signed <= size)
         };
-        assert!(all.refine(0, 1 << 20, values, wanted, || true).is_ok());
+        assert!(all.refine(0, 1 << 20, values, wanted).is_ok());
         all
     }
 

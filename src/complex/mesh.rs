@@ -41,53 +41,23 @@ pub struct MedialMesh {
 
 /// The first violation that [`MedialMesh::check`] found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum ComplexError {
     /// A centre or radius is not a number, or the radius is negative.
     #[error("sphere {sphere} is not valid: centre {centre}, radius {radius}")]
-    Sphere {
-        /// Index of the sphere.
-        sphere: usize,
-        /// Its centre.
-        centre: Vec3,
-        /// Its radius.
-        radius: f64,
-    },
+    Sphere { sphere: usize, centre: Vec3, radius: f64 },
     /// An edge names a sphere that does not exist, or its indices do not ascend.
     #[error("edge {edge} {ends:?} is not an ascending pair of the {spheres} spheres")]
-    Edge {
-        /// Index of the edge.
-        edge: usize,
-        /// Its ends.
-        ends: [u32; 2],
-        /// Number of spheres.
-        spheres: usize,
-    },
+    Edge { edge: usize, ends: [u32; 2], spheres: usize },
     /// A face names a sphere that does not exist, or its indices do not ascend.
     #[error("face {face} {corners:?} is not an ascending triple of the {spheres} spheres")]
-    Face {
-        /// Index of the face.
-        face: usize,
-        /// Its corners.
-        corners: [u32; 3],
-        /// Number of spheres.
-        spheres: usize,
-    },
+    Face { face: usize, corners: [u32; 3], spheres: usize },
     /// Edges or faces are repeated or out of order.
     #[error("{what} {index} is not larger than its predecessor: repeated or unsorted")]
-    Order {
-        /// `"edge"` or `"face"`.
-        what: &'static str,
-        /// Index of the later one.
-        index: usize,
-    },
+    Order { what: &'static str, index: usize },
     /// A face lacks one of its edges.
     #[error("face {face} has the side {side:?}, which is not listed as an edge")]
-    MissingEdge {
-        /// Index of the face.
-        face: usize,
-        /// The missing pair.
-        side: [u32; 2],
-    },
+    MissingEdge { face: usize, side: [u32; 2] },
     /// The contacts do not fit the spheres.
     #[error("contacts: {0}")]
     Contacts(String),

@@ -12,7 +12,7 @@ pub mod union_axis;
 mod voronoi;
 
 pub use conforming::{Conforming, ConformingError};
-pub use contour::{ContourError, UnionSurface, union_surface, union_surface_while};
+pub use contour::{ContourError, UnionSurface, union_surface, union_surface_within};
 pub use formats::{
     LoadedMa, Look, MaError, MaErrorKind, READABLE, Radii, ReadOptions, SphereValues, WRITABLE,
     left_out, parse_ma, parse_obj, parse_ply, read, read_content, read_with, single_precision_loss,

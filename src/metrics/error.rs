@@ -6,6 +6,7 @@ use crate::surface::BvhError;
 
 /// Reason why a medial mesh is not measured.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum MetricError {
     /// The medial mesh has no union.
     #[error(transparent)]
@@ -27,12 +28,7 @@ pub enum MetricError {
     Spacing(f64),
     /// The balls on the primitives would not fit into memory.
     #[error("{count:.0} balls: too many (expected at most {most}); choose a wider spacing")]
-    TooManyBalls {
-        /// Balls at the requested spacing.
-        count: f64,
-        /// The limit.
-        most: usize,
-    },
+    TooManyBalls { count: f64, most: usize },
     /// An interval that cannot be certified.
     #[error(
         "tolerance {0}: cannot be certified (expected a fraction of the diagonal between 1e-6 and 1)"
@@ -40,12 +36,7 @@ pub enum MetricError {
     Tolerance(f64),
     /// The certificate would not fit into memory.
     #[error("tolerance {tolerance:.1e}: needs {pieces} pieces and more; choose a larger one")]
-    TooFine {
-        /// Width of the interval.
-        tolerance: f64,
-        /// Pieces at the moment of giving up.
-        pieces: usize,
-    },
+    TooFine { tolerance: f64, pieces: usize },
     /// The balls on the primitives cannot be triangulated.
     #[error(transparent)]
     Triangulation(#[from] TriangulationError),

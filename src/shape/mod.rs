@@ -274,6 +274,7 @@ impl Shape {
 
 /// Reason why a substrate is not built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum ShapeError {
     /// The bounding box is empty, flat to a point, or not finite.
     #[error("the surface has no extent: its bounding-box diagonal is zero or not finite")]
@@ -302,10 +303,7 @@ pub enum ShapeError {
          all within a billionth of its diagonal of it; parts so thin or small relative to the whole \
          cannot be resolved: put parts that are far apart into files of their own"
     )]
-    BelowResolution {
-        /// Number of these circumcentres.
-        centres: usize,
-    },
+    BelowResolution { centres: usize },
 }
 
 impl ShapeError {

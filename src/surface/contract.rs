@@ -25,9 +25,6 @@ pub struct Contraction {
     pub mesh: TriMesh,
     /// Edges contracted.
     pub contracted: usize,
-    /// Edges below their limit that stay, because the surface would not be a manifold, or would fold
-    /// over.
-    pub refused: usize,
     /// Components that shrank to nothing.
     pub dropped: usize,
 }
@@ -45,8 +42,7 @@ pub enum Folds {
 ///
 /// `limits` has one length for each vertex, in the unit of the mesh. No vertex moves farther than its
 /// limit, so the surface moves no farther than the largest; it stays closed and manifold with the same
-/// genus. Components that are smaller than the limits disappear. `go_on` runs every few thousand
-/// edges; the result is `None` once it returns false. Serial; `O(F log F)`.
+/// genus. Components that are smaller than the limits disappear. Serial; `O(F log F)`.
 ///
 /// ```
 /// use medial::Vec3;
@@ -60,30 +56,21 @@ pub enum Folds {
 ///         [1, 3, 2], [1, 4, 3], [1, 5, 4], [1, 2, 5],
 ///     ],
 /// };
-/// let whole = contract_short_edges(&split, &[1e-6; 6], Folds::Ignored, || true).unwrap();
+/// let whole = contract_short_edges(&split, &[1e-6; 6], Folds::Ignored);
 /// assert_eq!((whole.mesh.vertices.len(), whole.mesh.faces.len()), (5, 6));
 /// ```
 ///
 /// # Panics
 /// If there are fewer limits than vertices, or a face names a vertex that does not exist.
-pub fn contract_short_edges(
-    mesh: &TriMesh,
-    limits: &[f64],
-    folds: Folds,
-    mut go_on: impl FnMut() -> bool,
-) -> Option<Contraction> {
+pub fn contract_short_edges(mesh: &TriMesh, limits: &[f64], folds: Folds) -> Contraction {
     let mut surface = Shrinking::new(mesh, limits, folds);
     let mut queue: BinaryHeap<_> = surface.short_edges().collect();
     let mut contracted = 0;
     loop {
         // Collected for the next round: a contraction nearby may make the link condition hold.
         let mut refused = Vec::new();
-        let (before, mut popped) = (contracted, 0);
+        let before = contracted;
         while let Some(Reverse(edge)) = queue.pop() {
-            if popped % 4096 == 0 && !go_on() {
-                return None;
-            }
-            popped += 1;
             let (_, a, b) = edge;
             if !surface.is_edge(a, b) {
                 continue;
@@ -102,9 +89,7 @@ pub fn contract_short_edges(
         refused.retain(|&(_, a, b)| surface.is_edge(a, b));
         if contracted == before {
             let dropped = surface.drop_specks();
-            refused.retain(|&(_, a, b)| surface.is_edge(a, b));
-            let mesh = surface.finish();
-            return Some(Contraction { mesh, contracted, refused: refused.len(), dropped });
+            return Contraction { mesh: surface.finish(), contracted, dropped };
         }
         queue = refused.into_iter().map(Reverse).collect();
     }
@@ -287,5 +272,5 @@ impl From<&PowerCrust> for TriMesh {
 /// the distance of samples will do. `O(n log n)`.
 pub fn crust_surface(crust: &PowerCrust, coincident: f64) -> Contraction {
     let limits = vec![coincident; crust.corners().len()];
-    contract_short_edges(&crust.into(), &limits, Folds::Ignored, || true).expect("never stopped")
+    contract_short_edges(&crust.into(), &limits, Folds::Ignored)
 }

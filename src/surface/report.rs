@@ -102,13 +102,7 @@ pub enum Fault {
     Coordinate { at: Place, vertex: usize, value: f64 },
     /// A face names a vertex that does not exist.
     #[error("{}face {face} names the vertex {index} of {}", before(.at), counted(*.vertices, "vertex"))]
-    Index {
-        at: Place,
-        face: usize,
-        /// The vertex as the file writes it (OBJ counts from 1 and backwards from -1).
-        index: i64,
-        vertices: usize,
-    },
+    Index { at: Place, face: usize, index: i64, vertices: usize },
     /// A face with fewer than three corners.
     #[error("{}face {face} has {}; three are the least", before(.at), counted(*.corners, "corner"))]
     TooFewCorners { at: Place, face: usize, corners: usize },

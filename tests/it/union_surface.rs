@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 
 use medial::Vec3;
 use medial::complex::{
-    ComplexError, ContourError, MedialMesh, MedialUnion, Sphere, union_surface, union_surface_while,
+    ComplexError, ContourError, MedialMesh, MedialUnion, Sphere, union_surface,
+    union_surface_within,
 };
 use medial::metrics::{EnvelopeOptions, sample_envelope, union_betti};
 use medial::surface::{self, SurfaceReport, TriangleBvh};
@@ -167,31 +168,11 @@ fn loops_and_voids_of_the_union_are_those_of_the_surface() {
 }
 
 #[test]
-fn it_stops_when_the_callback_returns_false() {
-    let ball = mesh(&[([0.0; 3], 1.0)], &[], &[]);
-    let within = |most: usize| {
-        let mut calls = 0;
-        let made = union_surface_while(&ball, 0.1, 1 << 24, || {
-            calls += 1;
-            calls <= most
-        });
-        (made, calls)
-    };
-    let (whole, calls) = within(usize::MAX);
-    assert_eq!(whole, union_surface(&ball, 0.1));
-    // It is called in every round of the refinement, and last while edges are contracted.
-    assert!(calls > 12, "{calls}");
-    for most in [0, 1, 10, calls - 1] {
-        assert!(matches!(within(most).0, Err(ContourError::Cancelled)), "{most}");
-    }
-}
-
-#[test]
 fn unusable_tolerances_and_meshes_are_errors() {
     let ball = mesh(&[([0.0; 3], 1.0)], &[], &[]);
     assert!(matches!(union_surface(&ball, 0.0), Err(ContourError::Tolerance(_))));
     assert!(matches!(union_surface(&ball, f64::NAN), Err(ContourError::Tolerance(_))));
-    let coarse = |tolerance| union_surface_while(&ball, tolerance, 50_000, || true);
+    let coarse = |tolerance| union_surface_within(&ball, tolerance, 50_000);
     let Err(ContourError::TooFine { feasible, .. }) = coarse(1e-3) else {
         panic!("a million tetrahedra are needed")
     };

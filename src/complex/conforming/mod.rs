@@ -76,6 +76,7 @@ pub struct Conforming {
 
 /// Why a surface has no such triangulation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum ConformingError {
     /// The vertices do not span space.
     #[error(transparent)]
@@ -85,14 +86,7 @@ pub enum ConformingError {
     Touching,
     /// More points than allowed would be needed.
     #[error("{missing} faces are still missing after {added} points were added, {most} at most")]
-    Budget {
-        /// Faces of the refined surface that are no facets.
-        missing: usize,
-        /// Points added so far.
-        added: usize,
-        /// The limit.
-        most: usize,
-    },
+    Budget { missing: usize, added: usize, most: usize },
     /// The surface crosses itself.
     #[error("a cell is on both sides of the surface: it crosses itself")]
     Crossing,

@@ -75,6 +75,7 @@ const MAX_COORDINATE: f64 = 1e150;
 
 /// Why a medial mesh has no union.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum UnionError {
     /// There is nothing to be near to.
     #[error("the medial mesh has no spheres")]
@@ -87,10 +88,7 @@ pub enum UnionError {
         "sphere {sphere} has a coordinate or radius above 1e150 units: is the medial mesh in the \
          unit of the surface?"
     )]
-    TooLarge {
-        /// Index of the sphere.
-        sphere: usize,
-    },
+    TooLarge { sphere: usize },
 }
 
 impl MedialUnion {
