@@ -8,7 +8,7 @@ use crate::range_queue::RangeQueue;
 /// An edge with its cost at the time the candidate was made.
 ///
 /// In the order in which candidates come out of a queue: smaller cost, then smaller second key, then smaller ids.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
     cost: f64,
     tie: f64,
@@ -49,10 +49,6 @@ impl Candidate {
 impl Ord for Candidate {
     #[inline]
     fn cmp(&self, other: &Self) -> Ordering {
-        // Costs almost always differ: one comparison then decides in the inner loop of the heap.
-        if self.cost != other.cost {
-            return self.cost.total_cmp(&other.cost);
-        }
         let keys = self.cost.total_cmp(&other.cost).then(self.tie.total_cmp(&other.tie));
         keys.then(self.ends.cmp(&other.ends)).then(self.stamp.cmp(&other.stamp))
     }
@@ -63,11 +59,16 @@ impl PartialOrd for Candidate {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
-}
 
-impl PartialEq for Candidate {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
+    #[inline]
+    fn lt(&self, other: &Self) -> bool {
+        // Costs almost always differ: one comparison then decides in the inner loop of the heap.
+        if self.cost != other.cost { self.cost < other.cost } else { self.cmp(other).is_lt() }
+    }
+
+    #[inline]
+    fn ge(&self, other: &Self) -> bool {
+        !self.lt(other)
     }
 }
 
