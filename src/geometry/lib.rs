@@ -97,7 +97,7 @@ pub use regular::Regular;
 pub use sphere::{Cone, ConeFrame, Slab, SlabFace, SlabPlanes, Sphere, separation_angle};
 pub use triangles_meet::{TriangleTree, triangles_cross, triangles_meet};
 pub use triangulation::{CellId, TriangulationError, VertexId};
-pub use union_boundary::{MergedVertices, UnionBoundary, UnionVertex};
+pub use union_boundary::{UnionBoundary, UnionVertex};
 
 /// The crate of [`Vec3`], in the version that this crate uses.
 pub use glam;

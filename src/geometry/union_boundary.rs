@@ -240,40 +240,10 @@ fn is_point(complex: &DualComplex<'_>, start: Facet, end: Facet) -> bool {
 
 // Step 3: one point for each group of equal vertices.
 
-/// Vertices of the boundary of a union of balls, each once.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MergedVertices {
-    points: Vec<Vec3>,
-    point_of: Vec<u32>,
-    /// The balls of point `i` are `balls[start[i]..start[i + 1]]`.
-    start: Vec<u32>,
-    balls: Vec<u32>,
-}
-
-impl MergedVertices {
-    /// The positions, in the order of the first vertex of each. A position is taken from the vertex
-    /// with the most nearly rectangular triangle, which determines it best.
-    pub fn points(&self) -> &[Vec3] {
-        &self.points
-    }
-
-    /// For each vertex of the [`UnionBoundary`] its point.
-    pub fn point_of(&self) -> &[u32] {
-        &self.point_of
-    }
-
-    /// The balls whose spheres meet in a point, ascending: three or more.
-    ///
-    /// # Panics
-    /// If there is no such point.
-    pub fn balls(&self, point: usize) -> &[u32] {
-        &self.balls[self.start[point] as usize..self.start[point + 1] as usize]
-    }
-}
-
 impl UnionBoundary {
-    /// Merges vertices that are one point exactly, see [`UnionBoundary::coincident`].
-    pub fn merge(&self) -> MergedVertices {
+    /// Merges vertices that are one point exactly, see [`UnionBoundary::coincident`]: the positions of the points in the order
+    /// of their first vertices, and for each vertex its point.
+    pub fn merge(&self) -> (Vec<Vec3>, Vec<u32>) {
         let mut groups = DisjointSets::singletons(self.vertices.len());
         for &[a, b] in &self.coincident {
             groups.join(a, b);
@@ -295,23 +265,6 @@ impl UnionBoundary {
                 }
             }
         }
-        let with_balls = point_of.iter().zip(&self.vertices);
-        let mut pairs: Vec<(u32, u32)> =
-            with_balls.flat_map(|(&point, v)| v.balls.map(|ball| (point, ball))).collect();
-        pairs.sort_unstable();
-        pairs.dedup();
-        let mut start = vec![0; best.len() + 1];
-        for &(point, _) in &pairs {
-            start[point as usize + 1] += 1;
-        }
-        for i in 0..best.len() {
-            start[i + 1] += start[i];
-        }
-        MergedVertices {
-            points: best.into_iter().map(|i| self.vertices[i].position).collect(),
-            point_of,
-            start,
-            balls: pairs.into_iter().map(|pair| pair.1).collect(),
-        }
+        (best.into_iter().map(|i| self.vertices[i].position).collect(), point_of)
     }
 }

@@ -20,6 +20,7 @@
 
 use rayon::prelude::*;
 
+use super::pieces::{BURIAL, EXPOSED};
 use super::samples::{Pose, SurfaceSamples};
 use crate::Vec3;
 use crate::complex::MedialUnion;
@@ -82,12 +83,19 @@ impl<F: Fn(Vec3, &mut usize) -> f64 + Sync> Hill for OnMesh<'_, F> {
 
 /// The boundary of a union, with distances from a mesh.
 pub(super) struct OnUnion<'a> {
-    pub union: &'a MedialUnion,
-    pub surface: &'a TriangleBvh,
+    union: &'a MedialUnion,
+    surface: &'a TriangleBvh,
     /// Points deeper than this in the union are not on its boundary.
-    pub burial: f64,
+    burial: f64,
     /// Width of a gap between two primitives that counts as none.
-    pub touching: f64,
+    touching: f64,
+}
+
+impl<'a> OnUnion<'a> {
+    /// `diameter` is that of the surface.
+    pub fn new(union: &'a MedialUnion, surface: &'a TriangleBvh, diameter: f64) -> Self {
+        Self { union, surface, burial: EXPOSED * diameter, touching: BURIAL * diameter }
+    }
 }
 
 impl Hill for OnUnion<'_> {
@@ -284,7 +292,7 @@ mod tests {
         // Their spheres meet in a circle, the lowest point of which is nearest to the square.
         let ball = |x: f64| Sphere::new(Vec3::new(0.5 + x, 0.5, -1.0), 0.5);
         let union = MedialUnion::of_spheres(&[ball(-0.3), ball(0.3)]).unwrap();
-        let hill = OnUnion { union: &union, surface: &tree, burial: 1e-12, touching: 1e-7 };
+        let hill = OnUnion::new(&union, &tree, 1.0);
         // Next to the pole that is farthest from the square.
         let found = best(&hill, &surface, &[Vec3::new(0.15, 0.55, -1.49)], 0.1);
         assert!((found.distance - 1.5).abs() < 1e-6, "{found:?}");

@@ -31,7 +31,7 @@ use super::depth::Boundary;
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::error::MetricError;
 use super::evaluation::Distances;
-use super::pieces::{BURIAL, EXPOSED, Patches};
+use super::pieces::{BURIAL, Patches};
 use super::samples::SurfaceSamples;
 use super::sweep::{FINAL_SHARE, swept};
 use crate::Vec3;
@@ -47,12 +47,6 @@ pub struct DistanceOptions {
     pub envelope_samples: usize,
     /// Seed of both.
     pub seed: u64,
-}
-
-impl Default for DistanceOptions {
-    fn default() -> Self {
-        Self { surface_samples: 50_000, envelope_samples: 50_000, seed: 0 }
-    }
 }
 
 /// Distances between the surface `surface`, whose faces are in `bvh`, and the union of the
@@ -117,12 +111,7 @@ pub(super) fn distances_with_envelope(
     let reverse_mean = sampled.mean(&on_boundary);
     let reverse_samples = sampled.points.len();
     let mut envelope = Envelope { points: sampled.points.clone(), distances: on_boundary };
-    let hill = OnUnion {
-        union,
-        surface: bvh,
-        burial: EXPOSED * pose.diameter(),
-        touching: BURIAL * pose.diameter(),
-    };
+    let hill = OnUnion::new(union, bvh, pose.diameter());
     let (points, values) = (envelope.points.as_slice(), envelope.distances.as_slice());
     let peaks = ascend(&hill, &Start { points, values, ..start });
     envelope.extend(peaks);

@@ -5,7 +5,7 @@ use super::depth::Boundary;
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::error::MetricError;
 use super::hausdorff::DistanceOptions;
-use super::pieces::{BURIAL, EXPOSED, Patches};
+use super::pieces::{BURIAL, Patches};
 use super::samples::SurfaceSamples;
 use super::sweep::swept;
 use crate::Vec3;
@@ -83,12 +83,7 @@ impl<'a> PeakSearch<'a> {
             OnMesh { mesh: tree, value: |p, near: &mut usize| boundary.estimate(p, near) };
         let forward = ascend(&on_mesh, &start);
         let values = tree.distance_batch(&points);
-        let hill = OnUnion {
-            union: &union,
-            surface: tree,
-            burial: EXPOSED * pose.diameter(),
-            touching: BURIAL * pose.diameter(),
-        };
+        let hill = OnUnion::new(&union, tree, pose.diameter());
         let reverse = ascend(&hill, &Start { points: &points, values: &values, ..start });
         let mut peaks = Peaks {
             forward: boundary.proven(sorted(forward, &samples.points, &depths)),

@@ -34,18 +34,15 @@ impl Corners {
         balls: &[Sphere],
     ) -> Result<Self, TriangulationError> {
         let boundary = UnionBoundary::new(complex);
-        let merged = boundary.merge();
-        let points = merged.points().to_vec();
-        // Points are numbered in the order of their first vertices.
+        let (points, point_of) = boundary.merge();
         let mut vertices: Vec<UnionVertex> = Vec::with_capacity(points.len());
-        for (vertex, &point) in boundary.vertices().iter().zip(merged.point_of()) {
+        for (vertex, &point) in boundary.vertices().iter().zip(&point_of) {
             if point as usize == vertices.len() {
                 vertices.push(*vertex);
             }
         }
         let same = same_position(&points);
-        let of_vertex = merged.point_of().iter().map(|&point| same[point as usize]);
-        let of_vertex: Vec<u32> = of_vertex.collect();
+        let of_vertex: Vec<u32> = point_of.into_iter().map(|point| same[point as usize]).collect();
         let (start, meeting) = balls_of_corners(&boundary, &of_vertex, points.len());
         let delaunay = match complex.tetrahedra().next() {
             Some(_) => Some(spanning(&points, balls)?),

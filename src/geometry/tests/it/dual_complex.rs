@@ -170,7 +170,7 @@ fn random_balls_agree_with_the_definitions() {
             });
             assert!(near, "{ids:?} at {x} of {balls:?}");
         }
-        assert_eq!(boundary.merge().points().len(), boundary.vertices().len());
+        assert_eq!(boundary.merge().0.len(), boundary.vertices().len());
     }
     assert!(hidden > 30 && outside > 60 && vertices > 1_000, "{hidden} {outside} {vertices}");
 }
@@ -276,7 +276,7 @@ fn balls_in_a_plane_may_leave_holes() {
             })
             .collect();
         let complex = dual_complex(&balls);
-        (complex.betti(), UnionBoundary::new(&complex).merge().points().len())
+        (complex.betti(), UnionBoundary::new(&complex).merge().0.len())
     };
     assert_eq!(grid(2.5, Vec3::ZERO), ([16, 0, 0], 0));
     assert_eq!(grid(3.0, Vec3::ZERO), ([4, 0, 0], 0));
@@ -323,7 +323,7 @@ fn equal_balls_on_a_lattice_pass_their_thresholds_exactly() {
         let complex = DualComplex::new(&regular);
         complex.check().expect("a complex");
         assert_eq!(complex.betti(), betti, "weight {weight}");
-        assert_eq!(UnionBoundary::new(&complex).merge().points().len(), vertices);
+        assert_eq!(UnionBoundary::new(&complex).merge().0.len(), vertices);
     }
 }
 
@@ -434,12 +434,12 @@ fn balls_through_one_point_have_one_vertex_there() {
         complex.check().expect("a complex");
         assert_eq!(complex.betti()[0], 1);
         let boundary = UnionBoundary::new(&complex);
-        let merged = boundary.merge();
+        let (_, point_of) = boundary.merge();
         let at = |i: usize| boundary.vertices()[i].position;
         // Flat triangles place their points badly: those of the origin within this.
         let here: BTreeSet<u32> = (0..boundary.vertices().len())
             .filter(|&i| at(i).length() < 1e-4)
-            .map(|i| merged.point_of()[i])
+            .map(|i| point_of[i])
             .collect();
         assert!(here.len() <= 1, "{points:?}");
         met += here.len();
