@@ -26,6 +26,7 @@
 //! first; those of about equal size are kept spread over the shape (`methods/ranked.rs`).
 
 use medial::Vec3;
+use medial::complex::Sphere;
 use medial::geometry::separation_angle;
 use medial::shape::Shape;
 use medial::simplifier::{Diagnostics, Method, MethodInfo, NativeLevel, ParamFields, RunContext};
@@ -109,22 +110,10 @@ fn prepare<'s>(shape: &'s Shape, params: AngleParams, run: &RunContext) -> Prepa
 // - A sphere that touches the boundary at its own centre (radius zero), or in fewer than two points,
 //   has no angle; it gets `S = 0` and goes first.
 
-/// Ranks the spheres of the initial medial mesh. `O(n log n)`.
 fn rank_spheres(shape: &Shape, run: &RunContext) -> Result<Ranked> {
-    let mesh = shape.initial()?;
-    let mut diagnostics = Diagnostics::default();
-    let contacts = shape.contacts(&mesh, &mut diagnostics)?;
-    let value = mesh
-        .spheres
-        .par_iter()
-        .enumerate()
-        .map(|(sphere, &s)| {
-            run.check()?;
-            let angle = contacts.with(sphere, |points| separation_angle(s.centre, points));
-            Ok(angle.to_degrees())
-        })
-        .collect::<Result<_>>()?;
-    Ok(Ranked::new(mesh, value, scale(), diagnostics))
+    let angle =
+        |sphere: Sphere, contacts: &[Vec3]| separation_angle(sphere.centre, contacts).to_degrees();
+    Ranked::by_contacts(shape, run, angle, |_| scale())
 }
 
 // Angle filter, per Voronoi facet.

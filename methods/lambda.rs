@@ -116,20 +116,8 @@ fn prepare<'s>(shape: &'s Shape, params: LambdaParams, run: &RunContext) -> Prep
 // - The paper's set is a closed subset of the whole axis; the filter on Voronoi vertices with the
 //   induced subcomplex supports a number of spheres like every other method.
 
-/// Ranks the spheres of the initial medial mesh. `O(n log n)`.
 fn rank_spheres(shape: &Shape, run: &RunContext) -> Result<Ranked> {
-    let mesh = shape.initial()?;
-    let mut diagnostics = Diagnostics::default();
-    let contacts = shape.contacts(&mesh, &mut diagnostics)?;
-    let value = (0..mesh.spheres.len())
-        .into_par_iter()
-        .map(|sphere| {
-            run.check()?;
-            Ok(contacts.with(sphere, |points| enclosing_ball(points).1))
-        })
-        .collect::<Result<_>>()?;
-    let scale = scale(&mesh);
-    Ok(Ranked::new(mesh, value, scale, diagnostics))
+    Ranked::by_contacts(shape, run, |_, contacts| enclosing_ball(contacts).1, scale)
 }
 
 // Lambda-medial axis on the cells of the Voronoi diagram.

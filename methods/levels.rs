@@ -15,6 +15,7 @@ use std::fmt::Debug;
 use std::ops::{Bound, RangeBounds, RangeInclusive};
 
 use medial::Vec3;
+use medial::complex::collapse::CollapseComplex;
 use medial::complex::{MedialMesh, Sphere};
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::{
@@ -396,6 +397,23 @@ pub(crate) fn checked(
 ) -> Result<Simplified> {
     mesh.check()?;
     Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, requested) })
+}
+
+/// Why no edge of a complex may be collapsed, for the user: the homotopy type, where it has to be kept, or folded
+/// faces.
+pub(crate) fn why_stopped(complex: &mut CollapseComplex, keeps_topology: bool) -> String {
+    let edges: Vec<_> = complex.edges().collect();
+    if edges.is_empty() {
+        return "no edge is left, each sphere is a separate component".to_owned();
+    }
+    let mut is_held = |&&[a, b]: &&[u32; 2]| keeps_topology && !complex.keeps_homotopy(a, b);
+    let by_topology = edges.iter().filter(|edge| is_held(edge)).count();
+    format!(
+        "the link condition holds back {by_topology} of the {} edges left, to keep the topology, and {} would \
+         fold a face over",
+        edges.len(),
+        edges.len() - by_topology
+    )
 }
 
 // Balls in general position, for methods on unions of polar balls.

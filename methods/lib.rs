@@ -194,9 +194,25 @@ fn references(keys: &[&str]) -> String {
 /// A built-in solid, for unit tests.
 #[cfg(test)]
 fn test_shape(id: &str, resolution: u32) -> medial::shape::Shape {
-    let mesh = medial_datasets::find(id).expect("in the catalogue").mesh(resolution);
-    let report = medial::surface::validate(&mesh).expect("a solid");
-    medial::shape::Shape::new(id, &mesh, report, Default::default()).expect("an extent")
+    test_solid(id, &medial_datasets::find(id).expect("in the catalogue").mesh(resolution))
+}
+
+/// A box around the origin with half sides `half`, for unit tests.
+#[cfg(test)]
+fn test_cuboid(half: medial::Vec3) -> medial::shape::Shape {
+    let corner = |k: u32| {
+        half * medial::Vec3::from([k & 1, k >> 1 & 1, k >> 2].map(|bit| 2.0 * f64::from(bit) - 1.0))
+    };
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    test_solid("box", &medial::surface::TriMesh { vertices: (0..8).map(corner).collect(), faces })
+}
+
+#[cfg(test)]
+fn test_solid(name: &str, mesh: &medial::surface::TriMesh) -> medial::shape::Shape {
+    let report = medial::surface::validate(mesh).expect("a solid");
+    medial::shape::Shape::new(name, mesh, report, Default::default()).expect("an extent")
 }
 
 #[cfg(test)]

@@ -8,7 +8,9 @@ use medial::Vec3;
 use medial::complex::{DualTriangulation, MedialMesh, Sphere, VoronoiFacets};
 use medial::geometry::trees::spread_order;
 use medial::shape::Shape;
-use medial::simplifier::{Diagnostics, Level, Simplification, Simplified, SimplifyError};
+use medial::simplifier::{
+    Diagnostics, Level, RunContext, Simplification, Simplified, SimplifyError,
+};
 use rayon::prelude::*;
 
 use crate::Result;
@@ -41,6 +43,25 @@ impl Ranked {
         Self { mesh, value, order, scale, prepared }
     }
 
+    /// Ranks the spheres of the initial medial mesh by a value of their contact points. `O(n log n)`.
+    pub(crate) fn by_contacts(
+        shape: &Shape,
+        run: &RunContext,
+        value: impl Fn(Sphere, &[Vec3]) -> f64 + Sync,
+        scale: impl FnOnce(&MedialMesh) -> Scale,
+    ) -> Result<Self> {
+        let mesh = shape.initial()?;
+        let mut diagnostics = Diagnostics::default();
+        let contacts = shape.contacts(&mesh, &mut diagnostics)?;
+        let values = mesh.spheres.par_iter().enumerate().map(|(place, &sphere)| {
+            run.check()?;
+            Ok(contacts.with(place, |points| value(sphere, points)))
+        });
+        let values = values.collect::<Result<_>>()?;
+        let scale = scale(&mesh);
+        Ok(Self::new(mesh, values, scale, diagnostics))
+    }
+
     fn by_count(&self, requested: usize, diagnostics: &mut Diagnostics) -> (Vec<bool>, f64) {
         let count = requested.min(self.order.len());
         if count < requested {
@@ -53,11 +74,6 @@ impl Ranked {
             Some(&dropped) => self.value[dropped as usize],
             None => *self.scale.range.start(),
         };
-        let tied = self.order[..count].iter().rev();
-        let tied = tied.take_while(|&&s| tie(self.value[s as usize], threshold)).count();
-        if tied > 0 && count < self.order.len() {
-            diagnostics.count("kept_at_the_threshold", tied);
-        }
         let mut keep = vec![false; self.order.len()];
         for &sphere in &self.order[..count] {
             keep[sphere as usize] = true;
@@ -165,7 +181,7 @@ const CLASSES: f64 = 2.0;
 const ROUNDING: f64 = 1e-12;
 
 /// Whether two values are equal up to rounding.
-pub(crate) fn tie(a: f64, b: f64) -> bool {
+fn tie(a: f64, b: f64) -> bool {
     (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
 

@@ -133,13 +133,8 @@ impl Scaled {
         self.mesh.spheres.len()
     }
 
-    fn diagnose(&self, balls: usize, diagnostics: &mut Diagnostics) {
+    fn diagnose(&self, diagnostics: &mut Diagnostics) {
         let AxisTally { open, doubtful, .. } = self.tally;
-        diagnostics.count("balls", balls);
-        diagnostics.count("balls_in_the_dual_complex", self.tally.balls);
-        diagnostics.count("corners", self.tally.corners);
-        diagnostics.count("facets_left_open", open);
-        diagnostics.count("doubtful_groups", doubtful);
         let found = betti(&self.mesh);
         if found != self.union_betti {
             diagnostics.warn(format!(
@@ -161,7 +156,7 @@ impl Simplification for PreparedSat {
             }
             Level::Spheres(count) => to_count(self, count, &mut diagnostics)?,
         };
-        scaled.diagnose(self.spheres.len(), &mut diagnostics);
+        scaled.diagnose(&mut diagnostics);
         let (mesh, native_level) = (scaled.mesh.clone(), Some(scaled.scale));
         Ok(Simplified { native_level, diagnostics, ..Simplified::new(mesh, level) })
     }

@@ -2,27 +2,11 @@
 
 use medial::Vec3;
 use medial::metrics::CoverTest;
-use medial::shape::{Shape, ShapeOptions};
+use medial::shape::Shape;
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
-use medial::surface::{self, TriMesh};
 
 use super::{BEYOND, method};
-
-fn shape(mesh: &TriMesh) -> Shape {
-    let report = surface::validate(mesh).expect("a solid");
-    Shape::new("solid", mesh, report, ShapeOptions::default()).expect("an extent")
-}
-
-fn cuboid(half: Vec3) -> Shape {
-    let corner = |k: u32| {
-        let sign = |bit: u32| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
-        half * Vec3::new(sign(0), sign(1), sign(2))
-    };
-    let quads =
-        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    shape(&TriMesh { vertices: (0..8).map(corner).collect(), faces })
-}
+use crate::{test_cuboid as cuboid, test_shape};
 
 fn run(shape: &Shape, mood: &str, level: Level) -> Result<Simplified, SimplifyError> {
     let mut params = Params::none();
@@ -59,7 +43,7 @@ fn moods_are_proven_on_a_box_a_torus_and_a_thin_plate() {
     let torus = medial_datasets::find("torus").expect("a built-in shape");
     let shapes = [
         cuboid(Vec3::new(4.0, 2.0, 1.0)),
-        shape(&torus.mesh(torus.default_resolution)),
+        test_shape("torus", torus.default_resolution),
         cuboid(Vec3::new(1.0, 1.0, 0.004)),
     ];
     for (k, shape) in shapes.iter().enumerate() {
@@ -84,7 +68,7 @@ fn moods_are_proven_on_a_box_a_torus_and_a_thin_plate() {
 #[test]
 fn equal_radii_are_equal_and_proven() {
     let torus = medial_datasets::find("torus").expect("a built-in shape");
-    let shapes = [cuboid(Vec3::new(4.0, 2.0, 1.0)), shape(&torus.mesh(torus.default_resolution))];
+    let shapes = [cuboid(Vec3::new(4.0, 2.0, 1.0)), test_shape("torus", torus.default_resolution)];
     for shape in &shapes {
         let mut gaps = vec![];
         for (mood, side) in [("outside", 0), ("inside", 1), ("balanced", 2)] {

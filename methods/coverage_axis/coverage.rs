@@ -131,18 +131,10 @@ pub(super) struct Picks {
     pub uncoverable: usize,
 }
 
-/// The constant part of the score.
-pub(super) struct Score {
-    /// Penalty of each candidate's radius: `0.1 max r / r`, as the scripts call it.
-    penalties: Vec<f64>,
-}
-
-impl Score {
-    /// The constant part of the score of all candidates.
-    pub fn new(spheres: &[Sphere]) -> Self {
-        let largest = spheres.iter().map(|ball| ball.radius).fold(0.0, f64::max);
-        Self { penalties: spheres.iter().map(|ball| 0.1 * largest / ball.radius).collect() }
-    }
+/// The constant part of the score: the penalty of each candidate's radius, `0.1 max r / r`, as the scripts call it.
+pub(super) fn penalties(spheres: &[Sphere]) -> Vec<f64> {
+    let largest = spheres.iter().map(|ball| ball.radius).fold(0.0, f64::max);
+    spheres.iter().map(|ball| 0.1 * largest / ball.radius).collect()
 }
 
 /// Takes candidates until everything that can be covered is, or `limit` are taken.
@@ -157,7 +149,7 @@ impl Score {
 pub(super) fn choose(
     spheres: &[Sphere],
     coverage: &Coverage,
-    score: &Score,
+    penalties: &[f64],
     limit: usize,
     run: &RunContext,
 ) -> Result<Picks> {
@@ -175,7 +167,7 @@ pub(super) fn choose(
     let total = left;
     while left > 0 && chosen.len() < limit.min(spheres.len()) {
         run.step(total - left, total)?;
-        let best = best(&counts, &nearest, &is_chosen, score, chosen.is_empty());
+        let best = best(&counts, &nearest, &is_chosen, penalties, chosen.is_empty());
         let centre = spheres[best].centre;
         for (nearest, ball) in nearest.iter_mut().zip(spheres) {
             let squared = ball.centre.distance_squared(centre);
@@ -203,7 +195,7 @@ fn best(
     counts: &[u32],
     nearest: &[f64],
     is_chosen: &[bool],
-    score: &Score,
+    penalties: &[f64],
     is_first: bool,
 ) -> usize {
     let both = counts.iter().zip(nearest);
@@ -215,8 +207,8 @@ fn best(
     let free = (0..counts.len()).filter(|&ball| !is_chosen[ball]);
     let scored = free.map(|ball| {
         let distance = if is_first { 0.0 } else { nearest[ball] };
-        let value = by_count.score(f64::from(counts[ball])) + by_distance.score(distance)
-            - score.penalties[ball];
+        let value =
+            by_count.score(f64::from(counts[ball])) + by_distance.score(distance) - penalties[ball];
         (value, ball)
     });
     // `max_by` takes the last of equals, the authors' `argmax` the first.

@@ -26,24 +26,8 @@ pub(super) struct Cover {
     pub chosen: Vec<u32>,
     /// No cover has fewer balls.
     pub bound: usize,
-    /// Balls and samples that the reductions left.
-    pub reduced: [usize; 2],
-    /// Nodes of branch and bound.
-    pub nodes: usize,
     /// Samples that no candidate covers.
     pub uncoverable: usize,
-    /// The end of the search.
-    pub end: End,
-}
-
-/// The end of a search for a smallest cover.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum End {
-    /// The solver: nothing better is left, but for its rounding.
-    #[default]
-    Solver,
-    /// The number of nodes.
-    Nodes,
 }
 
 /// A smallest cover of all samples that can be covered, or the best that the limits allow.
@@ -69,7 +53,7 @@ pub(super) fn cover(coverage: &Coverage, run: &RunContext) -> Result<Cover> {
     found.chosen.extend(&reduced.forced);
     found.chosen.sort_unstable();
     found.bound += forced;
-    Ok(Cover { reduced: [reduced.balls.len(), reduced.rows.len()], uncoverable, ..found })
+    Ok(Cover { uncoverable, ..found })
 }
 
 /// The choices that the reductions leave.
@@ -112,12 +96,7 @@ fn solve(reduced: &Reduced, run: &RunContext) -> Result<Cover> {
     Ok(Cover {
         bound: bound.min(places.len()),
         chosen: places.iter().map(|&place| reduced.balls[place as usize]).collect(),
-        nodes: stats.nodes_solved as usize,
-        end: match outcome.termination_reason() {
-            TerminationReason::NodeLimit => End::Nodes,
-            _ => End::Solver,
-        },
-        ..Cover::default()
+        uncoverable: 0,
     })
 }
 

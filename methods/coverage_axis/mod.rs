@@ -47,7 +47,7 @@ mod tests;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-use coverage::{Coverage, Score};
+use coverage::{Coverage, penalties};
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::shape::Shape;
@@ -98,8 +98,13 @@ fn prepare<'s>(shape: &'s Shape, params: CoverageAxisParams, run: &RunContext) -
     let initial = shape.initial()?;
     run.step(0, initial.spheres.len())?;
     let instance = Instance::new(shape, &initial, run.seed)?;
-    let axis =
-        Axis { score: Score::new(&instance.spheres), instance, initial, params, run: run.clone() };
+    let axis = Axis {
+        penalties: penalties(&instance.spheres),
+        instance,
+        initial,
+        params,
+        run: run.clone(),
+    };
     // The inverse dilation gives more spheres when it is turned up, as a search expects of a knob.
     let range = 1.0 / DILATIONS.end()..=1.0 / DILATIONS.start();
     let (count, unit) = ("inverse_dilation_in_thousandths", "longest sides over the dilation");
@@ -115,7 +120,7 @@ struct PreparedCoverage {
 
 struct Axis {
     instance: Instance,
-    score: Score,
+    penalties: Vec<f64>,
     initial: Arc<MedialMesh>,
     params: CoverageAxisParams,
     run: RunContext,
@@ -177,7 +182,7 @@ impl Axis {
         diagnostics: &mut Diagnostics,
     ) -> Result<Vec<u32>> {
         let spheres = &self.instance.spheres;
-        let picks = coverage::choose(spheres, coverage, &self.score, most, &self.run)?;
+        let picks = coverage::choose(spheres, coverage, &self.penalties, most, &self.run)?;
         diagnostics.count("uncoverable_samples", picks.uncoverable);
         diagnostics.count("uncovered_samples", picks.uncovered);
         if picks.uncovered > 0 {
@@ -196,21 +201,14 @@ impl Axis {
     fn exact(&self, coverage: &Coverage, diagnostics: &mut Diagnostics) -> Result<Vec<u32>> {
         let cover = exact::cover(coverage, &self.run)?;
         diagnostics.count("uncoverable_samples", cover.uncoverable);
-        diagnostics.count("reduced_candidates", cover.reduced[0]);
-        diagnostics.count("reduced_samples", cover.reduced[1]);
-        diagnostics.count("nodes", cover.nodes);
         diagnostics.count("cover_bound", cover.bound);
         warn_of_uncoverable(cover.uncoverable, diagnostics);
         let reached = cover.chosen.len();
         if reached > cover.bound {
             let gap = 100.0 * (reached - cover.bound) as f64 / reached as f64;
-            let how = match cover.end {
-                exact::End::Solver => "the solver's rounding",
-                exact::End::Nodes => "the number of nodes",
-            };
             diagnostics.warn(format!(
-                "{reached} spheres cover, and no cover has fewer than {}: the search was ended by {how}, \
-                 at a gap of {gap:.1} %",
+                "{reached} spheres cover, and no cover has fewer than {}: the search ended at a gap of \
+                 {gap:.1} %",
                 cover.bound
             ));
         }

@@ -1,8 +1,7 @@
 //! The choice and the connection against their definitions.
 
-use medial::shape::ShapeOptions;
+use medial::Vec3;
 use medial::simplifier::Params;
-use medial::{Vec3, surface};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -24,8 +23,8 @@ fn covers(ball: &Sphere, sample: Vec3, delta: f64) -> bool {
 }
 
 fn choose(spheres: &[Sphere], coverage: &Coverage, limit: usize) -> Picks {
-    let score = Score::new(spheres);
-    coverage::choose(spheres, coverage, &score, limit, &RunContext::default()).unwrap()
+    let penalties = penalties(spheres);
+    coverage::choose(spheres, coverage, &penalties, limit, &RunContext::default()).unwrap()
 }
 
 fn exact_cover(coverage: &Coverage) -> Cover {
@@ -171,10 +170,7 @@ fn a_cylinder_takes_as_many_as_their_rings_are_wide() {
 }
 
 fn built_in(id: &str) -> Shape {
-    let built_in = medial_datasets::find(id).unwrap();
-    let mesh = built_in.mesh(built_in.default_resolution);
-    let report = surface::validate(&mesh).unwrap();
-    Shape::new(id, &mesh, report, ShapeOptions::default()).unwrap()
+    crate::test_shape(id, medial_datasets::find(id).unwrap().default_resolution)
 }
 
 fn answer(shape: &Shape, level: Level) -> Simplified {

@@ -10,7 +10,6 @@ use rayon::prelude::*;
 
 use super::SampleLists;
 use super::edge::{Edge, Ground, NONE, Star};
-use super::{HemParams, Inside};
 use crate::Result;
 
 /// Collapses between two reports of progress.
@@ -21,7 +20,6 @@ const JOB: usize = 4096;
 
 /// A medial mesh under contraction.
 pub(super) struct Contraction {
-    inside: Inside,
     /// The complex as it is now, with a record of the collapses.
     pub complex: CollapseComplex,
     /// The samples as they are assigned now.
@@ -31,7 +29,8 @@ pub(super) struct Contraction {
     star: Star,
     /// Largest error of a collapse so far.
     pub largest: f64,
-    tally: Tally,
+    rejected_by_link_condition: usize,
+    rejected_by_inversion: usize,
 }
 
 /// When to stop.
@@ -51,13 +50,6 @@ struct Taken {
     survivor: usize,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct Tally {
-    evaluations: usize,
-    held_by_topology: usize,
-    held_by_inversion: usize,
-}
-
 /// The state before a collapse of everything that it removes.
 struct Change {
     kept: u32,
@@ -72,21 +64,16 @@ struct Change {
 
 impl Contraction {
     /// Step 1: the samples of each sphere and the errors of all edges.
-    pub(super) fn new(
-        mesh: &MedialMesh,
-        samples: SampleLists,
-        params: HemParams,
-        run: &RunContext,
-    ) -> Result<Self> {
+    pub(super) fn new(mesh: &MedialMesh, samples: SampleLists, run: &RunContext) -> Result<Self> {
         let mut contraction = Self {
-            inside: params.inside,
             complex: CollapseComplex::from_mesh(mesh).recording(),
             samples,
             edges: Edges::default(),
             queue: CollapseQueue::default(),
             star: Star::new(mesh.spheres.len()),
             largest: 0.0,
-            tally: Tally::default(),
+            rejected_by_link_condition: 0,
+            rejected_by_inversion: 0,
         };
         contraction.evaluate_all(&mesh.edges, run)?;
         Ok(contraction)
@@ -95,7 +82,7 @@ impl Contraction {
     fn evaluate_all(&mut self, all: &[[u32; 2]], run: &RunContext) -> Result<()> {
         let ground = self.ground();
         let vertices = self.samples.spheres();
-        let jobs: Result<Vec<(Vec<Edge>, u64)>> = all
+        let jobs: Result<Vec<Vec<Edge>>> = all
             .par_chunks(JOB)
             .map(|chunk| {
                 let mut star = Star::new(vertices);
@@ -107,26 +94,22 @@ impl Contraction {
                 });
                 let evaluated = evaluated.collect();
                 run.check()?;
-                Ok((evaluated, star.distances))
+                Ok(evaluated)
             })
             .collect();
-        let jobs = jobs?;
         // Jobs come back in order, so candidates line up with edges for any thread order.
-        let edges = jobs.iter().flat_map(|(edges, _)| edges);
+        let edges = jobs?.concat();
         let candidates = all
             .iter()
-            .zip(edges.clone())
+            .zip(&edges)
             .map(|(&ends, edge)| candidate(ground.complex, ends, edge.queued));
-        let queue = CollapseQueue::from_candidates(candidates.collect());
-        let edges = all.iter().copied().zip(edges.copied()).collect();
-        self.star.distances += jobs.iter().map(|(_, distances)| distances).sum::<u64>();
-        (self.queue, self.edges) = (queue, edges);
-        self.tally.evaluations += all.len();
+        self.queue = CollapseQueue::from_candidates(candidates.collect());
+        self.edges = all.iter().copied().zip(edges).collect();
         Ok(())
     }
 
     fn ground(&self) -> Ground<'_> {
-        Ground { complex: &self.complex, samples: &self.samples, inside: self.inside }
+        Ground { complex: &self.complex, samples: &self.samples }
     }
 
     /// The stored errors of an edge.
@@ -185,9 +168,8 @@ impl Contraction {
         if edge.is_open() {
             // Beyond the next candidate the exact error does not matter yet.
             let cutoff = self.queue.peek(&self.complex).map_or(f64::INFINITY, |next| next.cost());
-            let Self { complex, samples, inside, star, .. } = self;
-            edge.evaluate(&Ground { complex, samples, inside: *inside }, ends, cutoff, star);
-            self.tally.evaluations += 1;
+            let Self { complex, samples, star, .. } = self;
+            edge.evaluate(&Ground { complex, samples }, ends, cutoff, star);
         }
         // Its candidate was popped; a barred edge is not queued again before a collapse renews it.
         edge.queued = f64::INFINITY;
@@ -200,7 +182,7 @@ impl Contraction {
         let [a, b] = ends;
         edge.tested = true;
         if !self.complex.keeps_homotopy(a, b) {
-            self.tally.held_by_topology += 1;
+            self.rejected_by_link_condition += 1;
             edge.bar(0);
             edge.bar(1);
             return;
@@ -208,7 +190,7 @@ impl Contraction {
         for (survivor, kept) in ends.into_iter().enumerate() {
             let centre = self.complex.sphere(kept).centre;
             if self.complex.folded_face(a, b, centre).is_some() {
-                self.tally.held_by_inversion += 1;
+                self.rejected_by_inversion += 1;
                 edge.bar(survivor);
             }
         }
@@ -257,8 +239,8 @@ impl Contraction {
     /// Renews an edge of the survivor, whose star gained that of the removed vertex. Its candidate is
     /// outdated, because the collapse changed the stamp of the survivor.
     fn renew_at_survivor(&mut self, change: &Change, other: u32) {
-        let Self { complex, samples, edges, queue, star, inside, .. } = self;
-        let ground = Ground { complex, samples, inside: *inside };
+        let Self { complex, samples, edges, queue, star, .. } = self;
+        let ground = Ground { complex, samples };
         let ends = ascending(change.kept, other);
         let edge = edges.entry(ends).or_insert_with(|| {
             // It was an edge of the removed vertex: the witnesses it had are good first guesses.
@@ -271,7 +253,7 @@ impl Contraction {
         let added = change.around.iter().map(|&x| [x, NONE]);
         let added = added.chain(change.sides.iter().copied());
         let added = added.filter(|simplex| !simplex.contains(&other));
-        star.distances += edge.renew(&ground, ends, change.removed, added);
+        edge.renew(&ground, ends, change.removed, added);
         edge.queued = f64::INFINITY;
         enqueue(queue, complex, ends, edge);
     }
@@ -279,8 +261,8 @@ impl Contraction {
     /// Renews another edge of a neighbour of the removed vertex: in the simplices of its star the
     /// survivor has replaced the removed vertex.
     fn renew_around(&mut self, change: &Change, [v, other]: [u32; 2]) {
-        let Self { complex, samples, edges, queue, star, inside, .. } = self;
-        let ground = Ground { complex, samples, inside: *inside };
+        let Self { complex, samples, edges, queue, .. } = self;
+        let ground = Ground { complex, samples };
         let ends = ascending(v, other);
         let edge = edges.get_mut(&ends).expect("every edge is stored");
         let is_end = |x: u32| x == v || x == other;
@@ -291,35 +273,15 @@ impl Contraction {
             _ => None,
         });
         let added = std::iter::once([change.kept, NONE]).chain(opposite);
-        star.distances += edge.renew(&ground, ends, change.removed, added);
+        edge.renew(&ground, ends, change.removed, added);
         enqueue(queue, complex, ends, edge);
-    }
-
-    /// Why no further edge may be collapsed, for the user.
-    pub(super) fn why_stopped(&mut self) -> String {
-        let edges: Vec<_> = self.complex.edges().collect();
-        if edges.is_empty() {
-            return "no edge is left, each sphere is a separate component".to_owned();
-        }
-        let by_topology =
-            edges.iter().filter(|&&[a, b]| !self.complex.keeps_homotopy(a, b)).count();
-        let by_inversion = edges.len() - by_topology;
-        format!(
-            "the link condition holds back {by_topology} of the {} edges left, to keep the topology, \
-             and {by_inversion} would fold a face over",
-            edges.len()
-        )
     }
 
     /// Counts of the whole run so far.
     pub(super) fn diagnose(&self, diagnostics: &mut Diagnostics) {
-        let Self { tally, samples, star, .. } = self;
         diagnostics.count("collapses", self.complex.record().len());
-        diagnostics.count("evaluations", tally.evaluations);
-        diagnostics.count("rejected_by_link_condition", tally.held_by_topology);
-        diagnostics.count("rejected_by_inversion", tally.held_by_inversion);
-        diagnostics.count("primitive_distances", star.distances as usize);
-        diagnostics.count("assigned_samples", samples.assigned());
+        diagnostics.count("rejected_by_link_condition", self.rejected_by_link_condition);
+        diagnostics.count("rejected_by_inversion", self.rejected_by_inversion);
     }
 }
 

@@ -12,8 +12,6 @@
 //!   If that is negative, the witness lies inside an added primitive, at least that deep.
 //! - `s < 0`: if the primitive that holds the witness is still there, the witness is at least as deep
 //!   as before. Otherwise nothing is known, and the bound is 0.
-//! - With [`Inside::Surface`], the new least distance to a surface is at least the smallest of the old
-//!   one and the distances to the added primitives, for any removal.
 //!
 //! An added primitive whose balls have no excess in the direction from the old nearest primitive
 //! to the witness cannot be nearer (below), so most are not even built.
@@ -23,7 +21,6 @@ use medial::complex::collapse::CollapseComplex;
 use medial::complex::{Sphere, ZERO_LENGTH};
 use medial::geometry::{Cone, SlabFace};
 
-use super::Inside;
 use super::SampleLists;
 
 /// Absent index.
@@ -95,8 +92,8 @@ impl Directed {
     }
 
     /// Makes a sample the witness if its distance to the gathered star is larger.
-    fn raise(&mut self, star: &mut Star, witness: u32, p: Vec3, inside: Inside) {
-        let nearest = star.nearest(p, 0.0, inside);
+    fn raise(&mut self, star: &mut Star, witness: u32, p: Vec3) {
+        let nearest = star.nearest(p, 0.0);
         if nearest.signed.abs() > self.signed.abs() {
             self.set(star, witness, p, &nearest, State::AtLeast);
         }
@@ -108,7 +105,6 @@ impl Directed {
 pub(super) struct Ground<'a> {
     pub complex: &'a CollapseComplex,
     pub samples: &'a SampleLists,
-    pub inside: Inside,
 }
 
 impl Edge {
@@ -148,22 +144,19 @@ impl Edge {
 
     /// Updates the bounds after a nearby collapse. Primitives with the vertex `gone` left the star,
     /// and `added` came: one link vertex denotes a cone, two denote a slab and its rim. Exact errors
-    /// become bounds, barred directions are to be tested again. Returns the number of distances
-    /// computed.
+    /// become bounds, barred directions are to be tested again.
     pub(super) fn renew(
         &mut self,
         ground: &Ground<'_>,
         ends: [u32; 2],
         gone: u32,
         added: impl Iterator<Item = [u32; 2]> + Clone,
-    ) -> u64 {
+    ) {
         self.tested = false;
-        let mut distances = 0;
         for (directed, hub) in self.into.iter_mut().zip(ends) {
             directed.state = State::AtLeast;
-            distances += directed.renew(ground, hub, gone, added.clone());
+            directed.renew(ground, hub, gone, added.clone());
         }
-        distances
     }
 
     /// Evaluates the directions that are only bounded: measures all samples, but stops once the error
@@ -205,7 +198,7 @@ impl Edge {
             star.set_hub(ground.complex.sphere(end));
             *directed = Directed::unknown(witnesses[0]);
             for witness in witnesses.into_iter().filter(|&w| w != NONE) {
-                directed.raise(star, witness, ground.samples.point(witness), ground.inside);
+                directed.raise(star, witness, ground.samples.point(witness));
             }
         }
     }
@@ -227,7 +220,7 @@ impl Directed {
             let p = ground.samples.point(id);
             // Only a larger distance changes the error, so the search may stop at a smaller one.
             let floor = self.error().max(NOISE);
-            let nearest = star.nearest(p, floor, ground.inside);
+            let nearest = star.nearest(p, floor);
             if nearest.signed.abs() > floor {
                 self.set(star, id, p, &nearest, State::Exact);
                 if self.error() > limit {
@@ -245,18 +238,14 @@ impl Directed {
         hub: u32,
         gone: u32,
         added: impl Iterator<Item = [u32; 2]>,
-    ) -> u64 {
+    ) {
         // Inside a primitive: the depth holds as long as that primitive does, see the head.
-        if self.signed < 0.0 {
-            if self.nearest.contains(&gone) {
-                self.signed = 0.0;
-            }
-            return 0;
+        if self.signed < 0.0 && self.nearest.contains(&gone) {
+            self.signed = 0.0;
         }
-        if self.signed == 0.0 {
-            return 0;
+        if self.signed <= 0.0 {
+            return;
         }
-        let mut tests = 0;
         let p = ground.samples.point(self.witness);
         let hub = ground.complex.sphere(hub);
         let hub_excess = excess_of(&hub, p, self.towards);
@@ -268,17 +257,14 @@ impl Directed {
             if rim.max(hub_excess) <= limit {
                 continue;
             }
-            let single = y == NONE;
-            if single {
-                tests += 1;
-                self.lower(Cone::new(hub, m).signed_distance(p), [x, y], ground.inside);
+            if y == NONE {
+                self.lower(Cone::new(hub, m).signed_distance(p), [x, y]);
             } else {
-                tests += 2;
                 if let Some(s) = SlabFace::new([hub, m, n]).and_then(|f| f.signed_distance(p)) {
-                    self.lower(s, [x, y], ground.inside);
+                    self.lower(s, [x, y]);
                 }
                 if rim > limit {
-                    self.lower(Cone::new(m, n).signed_distance(p), [x, y], ground.inside);
+                    self.lower(Cone::new(m, n).signed_distance(p), [x, y]);
                 }
             }
             // Inside an added primitive: further ones could only hold the witness deeper.
@@ -286,11 +272,9 @@ impl Directed {
                 break;
             }
         }
-        tests
     }
 
-    fn lower(&mut self, signed: f64, vertices: [u32; 2], inside: Inside) {
-        let signed = if inside == Inside::Surface { signed.abs() } else { signed };
+    fn lower(&mut self, signed: f64, vertices: [u32; 2]) {
         if signed < self.signed {
             (self.signed, self.nearest) = (signed, vertices);
         }
@@ -339,14 +323,12 @@ pub(super) struct Star {
     cones: Built<Cone>,
     faces: Built<Option<SlabFace>>,
     rims: Built<Cone>,
-    /// Distances to single primitives that were computed.
-    pub distances: u64,
 }
 
 /// The nearest primitive of a star.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Nearest {
-    /// Signed distance, negative inside; with [`Inside::Surface`] the distance to the surface.
+    /// Signed distance, negative inside.
     pub signed: f64,
     /// Centre of the interpolated sphere that attains it.
     centre: Vec3,
@@ -371,7 +353,6 @@ impl Star {
             cones: Built::default(),
             faces: Built::default(),
             rims: Built::default(),
-            distances: 0,
         }
     }
 
@@ -410,22 +391,14 @@ impl Star {
         self.faces.renew(self.sides.len());
     }
 
-    /// The nearest primitive to a sample. If its distance is at most `floor`, any primitive within
-    /// `floor` may be returned: the caller needs larger distances only.
-    pub(super) fn nearest(&mut self, p: Vec3, floor: f64, inside: Inside) -> Nearest {
-        match inside {
-            Inside::Depth => self.deepest(p, floor),
-            Inside::Surface => self.nearest_surface(p, floor),
-        }
-    }
-
     /// Ids of the vertices of a primitive except the hub; a missing one is [`u32::MAX`].
     pub(super) fn vertices(&self, nearest: &Nearest) -> [u32; 2] {
         nearest.places.map(|k| if k == NONE { NONE } else { self.link[k as usize] })
     }
 
-    /// The primitive of least signed distance.
-    fn deepest(&mut self, p: Vec3, floor: f64) -> Nearest {
+    /// The primitive of least signed distance to a sample. If that is at most `floor` in size, any primitive within
+    /// `floor` may be returned: the caller needs larger distances only.
+    pub(super) fn nearest(&mut self, p: Vec3, floor: f64) -> Nearest {
         // Start from the hub, which every primitive of the star but the rims contains.
         let mut best = self.at_hub(p);
         if self.is_within_hub(best.signed, limit(best.signed, floor)) {
@@ -465,42 +438,6 @@ impl Star {
         best
     }
 
-    /// The primitive whose surface is nearest; any one within `floor` will do.
-    fn nearest_surface(&mut self, p: Vec3, floor: f64) -> Nearest {
-        let mut best = self.at_hub(p);
-        let towards = best.towards(p);
-        let signed = best.signed;
-        best.signed = signed.abs();
-        if best.signed <= floor || self.is_within_hub(signed, ROUNDING - best.signed) {
-            return best;
-        }
-        let hub = self.measure_excess(p, towards);
-        for k in 0..self.link.len() {
-            if best.signed <= floor {
-                return best;
-            }
-            if hub.max(self.excess[k]) > ROUNDING - best.signed {
-                best.approach(self.cone(k).nearest_centre(p), [k as u32, NONE]);
-            }
-        }
-        for f in 0..self.sides.len() {
-            if best.signed <= floor {
-                return best;
-            }
-            let [k, l] = self.sides[f];
-            let rim = self.excess[k as usize].max(self.excess[l as usize]);
-            if rim.max(hub) > ROUNDING - best.signed
-                && let Some(found) = self.face(f).and_then(|face| face.nearest_centre(p))
-            {
-                best.approach(found, [k, l]);
-            }
-            if rim > ROUNDING - best.signed {
-                best.approach(self.rim(f).nearest_centre(p), [k, l]);
-            }
-        }
-        best
-    }
-
     /// Whether the reach alone excludes an excess beyond `limit` in the direction from the hub to a
     /// point at this signed distance. It often does in clusters of coincident spheres, whose links
     /// and samples are large.
@@ -508,8 +445,7 @@ impl Star {
         self.reach - (self.hub.radius + signed) <= limit
     }
 
-    fn at_hub(&mut self, p: Vec3) -> Nearest {
-        self.distances += 1;
+    fn at_hub(&self, p: Vec3) -> Nearest {
         let signed = self.hub.signed_distance(p);
         Nearest { signed, centre: self.hub.centre, places: [NONE; 2] }
     }
@@ -534,19 +470,16 @@ impl Star {
     }
 
     fn cone(&mut self, k: usize) -> &Cone {
-        self.distances += 1;
         self.cones.get(k, || Cone::new(self.hub, self.spheres[k]))
     }
 
     fn face(&mut self, f: usize) -> Option<&SlabFace> {
-        self.distances += 1;
         let [k, l] = self.sides[f];
         let spheres = || [self.hub, self.spheres[k as usize], self.spheres[l as usize]];
         self.faces.get(f, || SlabFace::new(spheres())).as_ref()
     }
 
     fn rim(&mut self, f: usize) -> &Cone {
-        self.distances += 1;
         let [k, l] = self.sides[f];
         self.rims.get(f, || Cone::new(self.spheres[k as usize], self.spheres[l as usize]))
     }
@@ -578,11 +511,6 @@ impl Nearest {
             *self = Self { signed, centre, places };
         }
         better
-    }
-
-    #[inline]
-    fn approach(&mut self, (signed, centre): (f64, Vec3), places: [u32; 2]) {
-        self.improve((signed.abs(), centre), places);
     }
 }
 

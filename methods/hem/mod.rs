@@ -23,20 +23,18 @@
 //!
 //! # The error and its bound
 //!
-//! With `inside=depth`, the default, the error of a sample is `|sigma|`: outside the star its exact
-//! distance, inside its depth in the primitive that holds it deepest. With `inside=surface` it is
-//! `mu`, as in the authors' code and in the errors that Q-MAT reports; the sphere `m_j` and the sides
-//! of the slabs then count as primitives. Signed distances are exact, even for contained spheres and
+//! The error of a sample is `|sigma|`: outside the star its exact distance, inside its depth in the
+//! primitive that holds it deepest. Signed distances are exact, even for contained spheres and
 //! slabs without tangent planes.
 //!
-//! Both local errors are upper bounds of `mu` over the whole mesh, for the samples and the star that
-//! they were evaluated for: `mu <= min |s| over the star <= |sigma of the star|`. They do not bound
+//! The local error is an upper bound of `mu` over the whole mesh, for the samples and the star that
+//! it was evaluated for: `mu <= min |s| over the star <= |sigma of the star|`. It does not bound
 //! the error of the result. A far primitive can hold a sample deeper than its own star does; and a
 //! collapse next to `j` changes primitives of the star of `j`, but its error covers the samples of
 //! its own ends only. So a bound ([`Level::Native`]) is enforced by measurement (this file):
 //!
 //! - Edges are collapsed until the cheapest one costs more than the bound.
-//! - The error of every sample is measured against the whole union, with the same `inside`.
+//! - The error of every sample is measured against the whole union.
 //! - While it exceeds the bound, collapses are undone, in growing steps and then by bisection. The
 //!   count `taken_back_for_the_bound` has their number. The error is not monotone: if the initial mesh
 //!   exceeds the bound, coarser meshes may not. So some of them are measured before the bound is
@@ -46,9 +44,9 @@
 //! the union's boundary is from the surface: where primitives no longer fill the solid, the boundary
 //! runs deep inside the solid although every sample is near some primitive.
 //!
-//! With `inside=depth` the initial mesh often exceeds a small bound: the cones and slabs of a
+//! The initial mesh often exceeds a small bound: the cones and slabs of a
 //! Voronoi medial mesh stick out of the surface between the spheres. The code's default of `1e-4` presumes
-//! `inside=surface`, for which the initial mesh has no error at all. [`Level::Published`] is the code's rule:
+//! `mu`, for which the initial mesh has no error at all. [`Level::Published`] is the code's rule:
 //! it stops before the first collapse whose local error exceeds `1e-4`. It guarantees no bound, and reports
 //! the error of the result.
 //!
@@ -72,8 +70,9 @@
 //!
 //! # Deviations from the papers
 //!
-//! - The default is `inside=depth`. `surface` hardly notices that a primitive swallows a sample, since
-//!   buried surfaces of other primitives are near it.
+//! - The authors' code, and the errors that Q-MAT reports, have `mu` in place of `|sigma|`, with the sphere `m_j`
+//!   and the sides of the slabs as primitives. It hardly notices that a primitive swallows a sample, since buried
+//!   surfaces of other primitives are near it.
 //! - The authors' code requires that an edge has as many faces as its ends have common neighbours.
 //!   Here a collapse must keep the homotopy type ([`CollapseComplex::keeps_homotopy`]). The full link
 //!   condition would reject more: edges that close a hole and the void in it at once, which does not
@@ -99,7 +98,6 @@ mod edge;
 #[cfg(test)]
 mod tests;
 
-use std::error::Error;
 use std::sync::Arc;
 
 use contract::{Contraction, Stop};
@@ -108,12 +106,11 @@ use medial::complex::collapse::replay;
 use medial::complex::{MedialMesh, MedialUnion};
 use medial::shape::{ContactSets, Shape, ShapeError};
 use medial::simplifier::{
-    Diagnostics, Level, Method, MethodInfo, NativeLevel, ParamFields, RunContext, Simplification,
+    Diagnostics, Level, Method, MethodInfo, NativeLevel, NoParams, RunContext, Simplification,
     Simplified, SimplifyError,
 };
-use serde::{Deserialize, Serialize};
 
-use crate::levels::{checked, some_spheres};
+use crate::levels::{checked, some_spheres, why_stopped};
 use crate::{Prepared, Result};
 
 /// Cost at which [`Level::Published`] stops: the default of the authors' code.
@@ -136,7 +133,7 @@ const PUBLISHED: f64 = 1e-4;
 /// assert!(coarse.mesh.spheres.len() < 40);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn method() -> Method<HemParams> {
+pub fn method() -> Method<NoParams> {
     let info = MethodInfo::new("hem", "HEM")
         .citation(
             "Feng Sun, Yi-King Choi, Yizhou Yu, Wenping Wang 2016. Medial Meshes - A Compact and \
@@ -153,12 +150,11 @@ pub fn method() -> Method<HemParams> {
         .published(
             "before the first collapse of a local error above 1e-4 of the diagonal, the default \
              of the authors' code; the error of the whole is measured, not held",
-        )
-        .params(HemParams::describe());
+        );
     Method::new(info, prepare)
 }
 
-fn prepare<'s>(shape: &'s Shape, params: HemParams, run: &RunContext) -> Prepared<'s> {
+fn prepare<'s>(shape: &'s Shape, _: NoParams, run: &RunContext) -> Prepared<'s> {
     let initial = shape.initial()?;
     if initial.spheres.is_empty() {
         return Err(ShapeError::EmptyMedialMesh.into());
@@ -166,10 +162,9 @@ fn prepare<'s>(shape: &'s Shape, params: HemParams, run: &RunContext) -> Prepare
     run.step(0, initial.spheres.len())?;
     let mut remarks = Diagnostics::default();
     let samples = SampleLists::of_contacts(&shape.contacts(&initial, &mut remarks)?);
-    let ruler = Ruler { samples: samples.touched(), inside: params.inside };
-    let contraction = Contraction::new(&initial, samples.clone(), params, run)?;
-    let run = run.clone();
-    Ok(Box::new(PreparedHem { initial, samples, params, ruler, run, remarks, contraction }))
+    let contraction = Contraction::new(&initial, samples.clone(), run)?;
+    let (touched, run) = (samples.touched(), run.clone());
+    Ok(Box::new(PreparedHem { initial, samples, touched, run, remarks, contraction }))
 }
 
 /// One shape, as far as it was contracted.
@@ -177,8 +172,8 @@ struct PreparedHem {
     initial: Arc<MedialMesh>,
     /// As assigned at the beginning.
     samples: SampleLists,
-    params: HemParams,
-    ruler: Ruler,
+    /// Positions of the samples that some sphere is responsible for.
+    touched: Vec<Vec3>,
     run: RunContext,
     /// Warnings of the preparation, repeated with every level.
     remarks: Diagnostics,
@@ -212,7 +207,7 @@ impl PreparedHem {
                 "{spheres} spheres instead of {target}: the initial medial mesh has no more"
             ));
         } else if reached > target {
-            let why = self.contraction.why_stopped();
+            let why = why_stopped(&mut self.contraction.complex, true);
             diagnostics.warn(format!("{reached} spheres instead of {target}: {why}"));
         }
         let native_level = Some(self.contraction.largest);
@@ -226,13 +221,19 @@ impl PreparedHem {
         let record = self.contraction.complex.record();
         let error_at = |collapses: usize| {
             self.run.step(record.len() - collapses, record.len())?;
-            self.ruler.error(&replay(&self.initial, &record[..collapses]))
+            error_of(&replay(&self.initial, &record[..collapses]), &self.touched)
         };
         // The contraction itself goes on from its own end later; levels are replayed from the record.
         let kept = match last_within(record.len(), epsilon, error_at)? {
             Found::Within(kept) => kept,
             Found::None { best, error, measured } => {
-                return Err(self.cannot_be_held(epsilon, best, error, measured));
+                let spheres = self.initial.spheres.len();
+                return Err(SimplifyError::Level(format!(
+                    "epsilon = {epsilon} is held by none of the {measured} levels that were measured, from \
+                     {spheres} spheres to {}: the best, of {} spheres, is {error:.3e} of the diagonal off a sample",
+                    spheres - record.len(),
+                    spheres - best
+                )));
             }
         };
         let mut diagnostics = self.diagnostics();
@@ -241,27 +242,11 @@ impl PreparedHem {
         checked(Level::Native(epsilon), mesh, Some(epsilon), diagnostics)
     }
 
-    fn cannot_be_held(
-        &self,
-        epsilon: f64,
-        best: usize,
-        error: f64,
-        measured: usize,
-    ) -> SimplifyError {
-        let spheres = self.initial.spheres.len();
-        SimplifyError::Level(format!(
-            "epsilon = {epsilon} is held by none of the {measured} levels that were measured, from \
-             {spheres} spheres to {}: the best, of {} spheres, is {error:.3e} of the diagonal off a sample",
-            spheres - self.contraction.complex.record().len(),
-            spheres - best
-        ))
-    }
-
     fn as_published(&mut self) -> Result<Simplified> {
         let too_far = self.contraction.largest > PUBLISHED;
         self.contract(Stop::Error(PUBLISHED), too_far)?;
         let mesh = self.contraction.complex.to_mesh();
-        let error = self.ruler.error(&mesh)?;
+        let error = error_of(&mesh, &self.touched)?;
         let mut diagnostics = self.diagnostics();
         if error > PUBLISHED {
             diagnostics.warn(format!(
@@ -274,8 +259,7 @@ impl PreparedHem {
 
     fn contract(&mut self, stop: Stop, restart: bool) -> Result<()> {
         if restart {
-            let Self { initial, samples, params, run, .. } = self;
-            self.contraction = Contraction::new(initial, samples.clone(), *params, run)?;
+            self.contraction = Contraction::new(&self.initial, self.samples.clone(), &self.run)?;
         }
         self.contraction.run_to(stop, &self.run)
     }
@@ -287,80 +271,20 @@ impl PreparedHem {
     }
 }
 
-// The parameters of HEM.
-
-medial::parameters! {
-    /// Parameters of HEM.
-    #[derive(Clone, Copy, Debug, PartialEq)]
-    pub struct HemParams {
-        /// Error of a sample inside the union: its depth in the deepest primitive, or its distance to
-        /// the nearest surface of a primitive, buried ones included.
-        inside: Inside = Inside::Depth, "depth or surface";
-    }
-}
-
-/// The error of a sample inside the union. Outside, it is always the distance to the nearest
-/// primitive.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Inside {
-    /// Its depth in the primitive that holds it deepest: `|sigma|`.
-    Depth,
-    /// Its distance to the nearest surface of a primitive, buried ones included: `mu`.
-    Surface,
-}
-
 // The error of a medial mesh, and the search for the last collapse within a bound.
 
 /// Number of evenly spread states that are measured before a bound is refused.
 const SPREAD_STATES: usize = 16;
 
-/// Measures medial meshes. Lengths are fractions of the diagonal.
-pub(super) struct Ruler {
-    /// The samples that some sphere is responsible for.
-    pub samples: Vec<Vec3>,
-    /// The error of a sample inside the union.
-    pub inside: Inside,
-}
-
-impl Ruler {
-    /// The largest error of a sample against the whole union.
-    ///
-    /// # Errors
-    /// When the mesh has no union.
-    pub(super) fn error(&self, mesh: &MedialMesh) -> Result<f64> {
-        let union = MedialUnion::new(mesh).map_err(unsupported)?;
-        sample_error(mesh, &union, &self.samples, self.inside)
-    }
-}
-
-/// For meshes without a union.
-fn unsupported(error: impl Error) -> SimplifyError {
-    SimplifyError::unsupported(error.to_string())
-}
-
-/// Largest error of a sample against the whole union, in one of the two readings.
-fn sample_error(
-    mesh: &MedialMesh,
-    union: &MedialUnion,
-    samples: &[Vec3],
-    inside: Inside,
-) -> Result<f64> {
-    if inside == Inside::Depth {
-        return Ok(largest(&union.signed_batch(samples)));
-    }
-    // The union leaves out spheres inside cones, but their surfaces count in this reading.
-    let spheres = MedialUnion::of_spheres(&mesh.spheres).map_err(unsupported)?;
-    let mut distances = union.unsigned_nearest_batch(samples);
-    for (distance, sphere) in distances.iter_mut().zip(spheres.unsigned_nearest_batch(samples)) {
-        *distance = distance.min(sphere);
-    }
-    Ok(largest(&distances))
-}
-
-/// The largest absolute value.
-fn largest(distances: &[f64]) -> f64 {
-    distances.iter().fold(0.0, |largest, distance| distance.abs().max(largest))
+/// The largest error of some samples against the whole union, a fraction of the diagonal.
+///
+/// # Errors
+/// When the mesh has no union.
+fn error_of(mesh: &MedialMesh, samples: &[Vec3]) -> Result<f64> {
+    let union =
+        MedialUnion::new(mesh).map_err(|error| SimplifyError::unsupported(error.to_string()))?;
+    let distances = union.signed_batch(samples);
+    Ok(distances.iter().fold(0.0, |largest, distance| distance.abs().max(largest)))
 }
 
 /// The result of a search for a bound.
@@ -484,6 +408,7 @@ impl SampleLists {
     }
 
     /// Length of all lists together.
+    #[cfg(test)]
     pub(super) fn assigned(&self) -> usize {
         self.of_sphere.iter().map(Vec::len).sum()
     }

@@ -10,13 +10,10 @@ use medial::geometry::{Cone, Slab};
 use medial::shape::ShapeOptions;
 use medial::simplifier::RunContext;
 use proptest::prelude::*;
-use rayon::prelude::*;
 
 use super::contract::{Contraction, Stop};
 use super::edge::{Edge, Ground, NOISE, Star};
-use super::{Inside, SampleLists, *};
-
-const READINGS: [Inside; 2] = [Inside::Depth, Inside::Surface];
+use super::{SampleLists, *};
 
 /// More than the rounding of distances, and than errors that count as zero.
 const CLOSE: f64 = 3e-12;
@@ -44,25 +41,24 @@ fn parts() -> impl Strategy<Value = Parts> {
 
 /// A complex without any geometric order, samples anywhere, spheres in spheres; with `coarse`
 /// coordinates full of coincident, contained and collinear ones.
-fn model((spheres, edges, faces, points, lists, coarse): Parts, inside: Inside) -> Model {
+fn model((spheres, edges, faces, points, lists, coarse): Parts) -> Model {
     let round = |x: f64| if coarse { (4.0 * x).round() / 4.0 } else { x };
     let spheres: Vec<Sphere> =
         spheres.iter().map(|&(c, r)| Sphere::new(c.map(round).into(), round(r))).collect();
     let edges = edges.iter().map(|e| [e[0], e[1]]).collect();
     let faces = faces.iter().map(|f| [f[0], f[1], f[2]]).collect();
     let mesh = MedialMesh::from_simplices(spheres, edges, faces).unwrap();
-    Model::new(&mesh, points.into_iter().map(Vec3::from).collect(), &lists, inside)
+    Model::new(&mesh, points.into_iter().map(Vec3::from).collect(), &lists)
 }
 
 fn contraction(model: &Model) -> Contraction {
-    let params = HemParams { inside: model.inside };
     let run = RunContext::default();
-    Contraction::new(&model.mesh(), model.sample_lists(), params, &run).expect("not cancelled")
+    Contraction::new(&model.mesh(), model.sample_lists(), &run).expect("not cancelled")
 }
 
 /// Every edge of a complex with its own evaluation in full against the oracle.
 fn assert_errors_agree(model: &Model, complex: &CollapseComplex, samples: &SampleLists) {
-    let ground = Ground { complex, samples, inside: model.inside };
+    let ground = Ground { complex, samples };
     let mut star = Star::new(model.spheres.len());
     for ends in model.edges() {
         let mut edge = Edge::unknown(u32::MAX);
@@ -136,32 +132,28 @@ proptest! {
     fn errors_are_those_of_the_oracle(
         parts in parts(), picks in prop::collection::vec((any::<prop::sample::Index>(), any::<bool>()), 0..7),
     ) {
-        for inside in READINGS {
-            let mut model = model(parts.clone(), inside);
-            let mut complex = CollapseComplex::from_mesh(&model.mesh());
-            let mut samples = model.sample_lists();
-            for (pick, turn) in &picks {
-                assert_errors_agree(&model, &complex, &samples);
-                let edges = model.edges();
-                if edges.is_empty() {
-                    break;
-                }
-                let [a, b] = *pick.get(&edges);
-                let [kept, removed] = if *turn { [a, b] } else { [b, a] };
-                complex.collapse(kept, removed, complex.sphere(kept));
-                samples.assign(removed, kept);
-                model.collapse(removed, kept);
-            }
+        let mut model = model(parts);
+        let mut complex = CollapseComplex::from_mesh(&model.mesh());
+        let mut samples = model.sample_lists();
+        for (pick, turn) in &picks {
             assert_errors_agree(&model, &complex, &samples);
+            let edges = model.edges();
+            if edges.is_empty() {
+                break;
+            }
+            let [a, b] = *pick.get(&edges);
+            let [kept, removed] = if *turn { [a, b] } else { [b, a] };
+            complex.collapse(kept, removed, complex.sphere(kept));
+            samples.assign(removed, kept);
+            model.collapse(removed, kept);
         }
+        assert_errors_agree(&model, &complex, &samples);
     }
 
     /// The lazy order is the order of full evaluation after each collapse.
     #[test]
     fn the_order_is_that_of_the_oracle(parts in parts()) {
-        for inside in READINGS {
-            follow(model(parts.clone(), inside), true);
-        }
+        follow(model(parts), true);
     }
 }
 
@@ -172,20 +164,17 @@ fn shape(id: &str, resolution: u32, noise: f64) -> Shape {
     Shape::new(id, &mesh, report, ShapeOptions::default()).unwrap()
 }
 
-fn model_of(shape: &Shape, inside: Inside) -> Model {
+fn model_of(shape: &Shape) -> Model {
     let mesh = shape.initial().unwrap();
     let contacts = shape.contacts(&mesh, &mut Diagnostics::default()).unwrap();
     let lists: Vec<_> = (0..mesh.spheres.len()).map(|v| contacts.ids(v).to_vec()).collect();
-    Model::new(&mesh, contacts.samples().to_vec(), &lists, inside)
+    Model::new(&mesh, contacts.samples().to_vec(), &lists)
 }
 
 #[test]
 fn the_order_is_that_of_the_oracle_on_solids() {
     for (id, resolution) in [("bracket", 3), ("capsule", 5), ("rod", 5)] {
-        let shape = shape(id, resolution, 2e-3);
-        READINGS.into_par_iter().for_each(|inside| {
-            follow(model_of(&shape, inside), id == "capsule");
-        });
+        follow(model_of(&shape(id, resolution, 2e-3)), id == "capsule");
     }
 }
 
@@ -204,7 +193,7 @@ fn chain(count: u32) -> Model {
     lists[0].push(4 * count);
     lists[count as usize - 1].push(4 * count + 1);
     let mesh = MedialMesh::from_simplices(spheres, edges, vec![]).unwrap();
-    Model::new(&mesh, points, &lists, Inside::Depth)
+    Model::new(&mesh, points, &lists)
 }
 
 fn run(model: &Model, stop: Stop) -> Contraction {
@@ -232,16 +221,14 @@ fn directed_errors_by_hand() {
     let spheres = vec![Sphere::new(Vec3::ZERO, 2.0), Sphere::new(4.0 * Vec3::X, 1.0)];
     let mesh = MedialMesh::from_simplices(spheres, vec![[0, 1]], vec![]).unwrap();
     let points = vec![-2.0 * Vec3::X, 5.0 * Vec3::X];
-    for inside in READINGS {
-        let model = Model::new(&mesh, points.clone(), &[vec![0], vec![1]], inside);
-        let contraction = contraction(&model);
-        let [into_large, into_small] = contraction.known([0, 1]).unwrap().into;
-        // Into the large one the small pole is 5 - 2 away; into the small one 6 - 1.
-        assert!((into_large.error() - 3.0).abs() < 1e-15);
-        // The dearer direction stops early at best.
-        assert!(into_small.error() > 3.0 && into_small.error() < 5.0 + 1e-15);
-        assert_eq!((model.error(1, 0), model.error(0, 1)), (3.0, 5.0));
-    }
+    let model = Model::new(&mesh, points, &[vec![0], vec![1]]);
+    let contraction = contraction(&model);
+    let [into_large, into_small] = contraction.known([0, 1]).unwrap().into;
+    // Into the large one the small pole is 5 - 2 away; into the small one 6 - 1.
+    assert!((into_large.error() - 3.0).abs() < 1e-15);
+    // The dearer direction stops early at best.
+    assert!(into_small.error() > 3.0 && into_small.error() < 5.0 + 1e-15);
+    assert_eq!((model.error(1, 0), model.error(0, 1)), (3.0, 5.0));
 }
 
 #[test]
@@ -272,26 +259,19 @@ pub(super) struct Model {
     faces: BTreeSet<[u32; 3]>,
     pub points: Vec<Vec3>,
     pub lists: Vec<BTreeSet<u32>>,
-    pub inside: Inside,
 }
 
 /// An edge: cost, ends, which of them survives.
 pub(super) type Choice = (f64, [u32; 2], usize);
 
 impl Model {
-    pub(super) fn new(
-        mesh: &MedialMesh,
-        points: Vec<Vec3>,
-        lists: &[Vec<u32>],
-        inside: Inside,
-    ) -> Self {
+    pub(super) fn new(mesh: &MedialMesh, points: Vec<Vec3>, lists: &[Vec<u32>]) -> Self {
         Self {
             spheres: mesh.spheres.clone(),
             edges: mesh.edges.iter().copied().collect(),
             faces: mesh.faces.iter().copied().collect(),
             points,
             lists: lists.iter().map(|list| list.iter().copied().collect()).collect(),
-            inside,
         }
     }
 
@@ -346,10 +326,7 @@ impl Model {
         };
         let error = |&id: &u32| {
             let distances = distances(self.points[id as usize]).into_iter();
-            match self.inside {
-                Inside::Depth => distances.fold(f64::INFINITY, f64::min).abs(),
-                Inside::Surface => distances.map(f64::abs).fold(f64::INFINITY, f64::min),
-            }
+            distances.fold(f64::INFINITY, f64::min).abs()
         };
         let ids = self.lists[removed as usize].union(&self.lists[kept as usize]);
         ids.map(error).fold(0.0, f64::max)

@@ -57,39 +57,29 @@ pub(super) enum Decision {
 
 /// Faces that rule out placements of an edge; often one rules out all four placements.
 #[derive(Default)]
-pub(super) struct Folded {
-    faces: [[u32; 3]; 4],
-    count: usize,
-}
+pub(super) struct Folded(Vec<[u32; 3]>);
 
 impl Folded {
     /// Whether a placement folds a face over: a face found before, or a new one, which is added.
     fn holds(&mut self, complex: &CollapseComplex, [a, b]: [u32; 2], sphere: Sphere) -> bool {
         // Known faces first: one test instead of both stars, and fewer obstacles to wake at.
-        let known = &self.faces[..self.count];
-        if known.iter().any(|&face| complex.folds(face, sphere.centre)) {
+        if self.0.iter().any(|&face| complex.folds(face, sphere.centre)) {
             return true;
         }
-        let Some(face) = complex.folded_face(a, b, sphere.centre) else {
-            return false;
-        };
-        self.faces[self.count] = face;
-        self.count += 1;
-        true
+        let new = complex.folded_face(a, b, sphere.centre);
+        self.0.extend(new);
+        new.is_some()
     }
 
     /// The corners other than the ends of the edge, each once.
-    fn obstacles(&self) -> ([u32; 8], usize) {
-        let (mut obstacles, mut count) = ([0; 8], 0);
-        for &[_, p, q] in &self.faces[..self.count] {
-            for v in [p, q] {
-                if !obstacles[..count].contains(&v) {
-                    obstacles[count] = v;
-                    count += 1;
-                }
+    fn obstacles(&self) -> Vec<u32> {
+        let mut obstacles = Vec::with_capacity(2 * self.0.len());
+        for v in self.0.iter().flat_map(|&[_, p, q]| [p, q]) {
+            if !obstacles.contains(&v) {
+                obstacles.push(v);
             }
         }
-        (obstacles, count)
+        obstacles
     }
 }
 
@@ -154,8 +144,7 @@ impl Contraction {
                 }
                 Decision::Fold(faces) => {
                     self.tally.held_by_inversion += 1;
-                    let (obstacles, count) = faces.obstacles();
-                    self.queue.park(cheapest, &obstacles[..count]);
+                    self.queue.park(cheapest, &faces.obstacles());
                 }
             }
             let done = self.tally.collapses - first;
@@ -246,28 +235,6 @@ impl Contraction {
         diagnostics.count("rejected_by_link_condition", tally.held_by_topology);
         diagnostics.count("taken_against_link_condition", tally.unlocked);
         diagnostics.count("rejected_by_inversion", tally.held_by_inversion);
-    }
-
-    /// Why no further edge may be collapsed, for the user.
-    pub(super) fn why_stopped(&mut self) -> String {
-        let edges: Vec<_> = self.complex.edges().collect();
-        if edges.is_empty() {
-            return "no edge is left, each sphere is a separate component".to_owned();
-        }
-        let keeps_topology = self.keeps_topology();
-        let (mut by_topology, mut by_inversion) = (0, 0);
-        for &[a, b] in &edges {
-            if keeps_topology && !self.complex.keeps_homotopy(a, b) {
-                by_topology += 1;
-            } else {
-                by_inversion += 1;
-            }
-        }
-        format!(
-            "the link condition holds back {by_topology} of the {} edges left, to keep the topology, \
-             and {by_inversion} would fold a face over",
-            edges.len()
-        )
     }
 }
 

@@ -72,7 +72,7 @@ use medial::simplifier::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::levels::{checked, some_spheres, within};
+use crate::levels::{checked, some_spheres, why_stopped, within};
 use crate::{Prepared, Result};
 
 /// Spheres of [`Level::Published`]: the count of the paper's Table II.
@@ -159,7 +159,8 @@ impl Simplification for PreparedQmat {
         self.contraction.diagnose(&mut diagnostics);
         let reached = self.contraction.complex.sphere_count();
         if reached > target {
-            let why = self.contraction.why_stopped();
+            let keeps_topology = self.contraction.keeps_topology();
+            let why = why_stopped(&mut self.contraction.complex, keeps_topology);
             diagnostics.warn(format!("{reached} spheres instead of {target}: {why}"));
         }
         checked(level, self.contraction.complex.to_mesh(), None, diagnostics)

@@ -129,14 +129,7 @@ fn of_union(shape: &Shape, run: &RunContext, diagnostics: &mut Diagnostics) -> R
     for (&ball, &vertex) in union.balls().iter().zip(&first_into) {
         axis.at_sphere[into[vertex as usize] as usize] += poles.volumes[ball as usize];
     }
-    diagnostics.count("fins", is_fin.iter().filter(|&&fin| fin).count());
     diagnostics.count("fins_left", fins_left);
-    diagnostics.count("balls", spheres.len());
-    diagnostics.count("balls_on_the_axis", union.balls().len());
-    diagnostics.count("vertices", whole.spheres.len());
-    diagnostics.count("vertices_merged", finless.spheres.len() - axis.mesh.spheres.len());
-    diagnostics.count("facets_left_open", union.tally().open);
-    diagnostics.count("doubtful_groups", union.tally().doubtful);
     let found = betti(&axis.mesh);
     axis.b2 = found[2];
     if found != union.union_betti() {

@@ -310,19 +310,6 @@ fn still(part: &Part, whole: &MedialMesh, moving: &[bool]) -> Still {
 
 /// The simplices without a moving corner, if there are any.
 fn rest_of(mesh: &MedialMesh, moving: &[bool]) -> Option<MedialMesh> {
-    let stays = |v: &u32| !moving[*v as usize];
-    let spheres: Vec<u32> = (0..moving.len() as u32).filter(stays).collect();
-    let mut place = vec![0; moving.len()];
-    for (new, &v) in (0..).zip(&spheres) {
-        place[v as usize] = new;
-    }
-    let edges = mesh.edges.iter().filter(|e| e.iter().all(stays));
-    let faces = mesh.faces.iter().filter(|f| f.iter().all(stays));
-    let rest = MedialMesh {
-        spheres: spheres.iter().map(|&v| mesh.spheres[v as usize]).collect(),
-        edges: edges.map(|e| e.map(|v| place[v as usize])).collect(),
-        faces: faces.map(|f| f.map(|v| place[v as usize])).collect(),
-        contacts: None,
-    };
-    (!rest.spheres.is_empty()).then_some(rest)
+    let stays: Vec<bool> = moving.iter().map(|moves| !moves).collect();
+    stays.contains(&true).then(|| mesh.induced(&stays))
 }

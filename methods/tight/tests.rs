@@ -1,9 +1,8 @@
 use medial::Vec3;
 use medial::complex::collapse::CollapseComplex;
 use medial::complex::{MedialMesh, Sphere, betti, crossing_faces};
-use medial::shape::{Shape, ShapeOptions};
+use medial::shape::Shape;
 use medial::simplifier::{Level, Params, RunContext, SimplifyError};
-use medial::surface::TriMesh;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -438,13 +437,7 @@ fn axes_in_one_plane_or_on_one_line_do_not_block_collapses() {
 fn a_bound_ends_near_the_fewest_spheres() {
     // The error of a cube falls in a step, from 7 % with eight spheres to nothing with nine, and the
     // finest meshes are worse. The capsule starts as a tangle.
-    let corner = |k: u32| [k & 1, k >> 1 & 1, k >> 2].map(f64::from).into();
-    let faces =
-        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let faces = faces.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    let cube = TriMesh { vertices: (0..8).map(corner).collect(), faces };
-    let report = medial::surface::validate(&cube).expect("a solid");
-    let cube = Shape::new("cube", &cube, report, ShapeOptions::default()).expect("an extent");
+    let cube = crate::test_cuboid(Vec3::ONE);
     let tight = crate::find("tight").unwrap();
     for (shape, bound, most) in
         [(&cube, 0.01, 10), (&cube, 0.003, 10), (&shape("capsule", 36), 0.01, 2)]

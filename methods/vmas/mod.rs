@@ -88,7 +88,7 @@ use medial::simplifier::{
 };
 use points::SurfacePoints;
 use rayon::prelude::*;
-use sampling::{Ended, NONE, Solid, Tally, VariationalSampling};
+use sampling::{Ended, NONE, Solid, VariationalSampling};
 use serde::{Deserialize, Serialize};
 
 use crate::levels::{some_spheres, within};
@@ -173,7 +173,8 @@ impl Simplification for PreparedVmas<'_> {
         let ended = sampling.run(target, &self.run)?;
         let mesh = sampling.mesh()?;
         let mut diagnostics = Diagnostics::default();
-        sampling.tally.describe(points.len(), &mut diagnostics);
+        diagnostics.count("surface_points", points.len());
+        diagnostics.count("iterations", sampling.iterations);
         explain(requested, target, mesh.spheres.len(), ended, &mut diagnostics);
         Ok(Simplified { diagnostics, ..Simplified::new(mesh, level) })
     }
@@ -218,21 +219,6 @@ fn explain(
             .warn(format!("{instead}: more than {target} need more surface points than there are"));
     } else if ended == Ended::IterationLimit {
         diagnostics.warn("the limit of rounds was reached, and the error is not at rest");
-    }
-}
-
-impl Tally {
-    fn describe(&self, points: usize, diagnostics: &mut Diagnostics) {
-        diagnostics.count("surface_points", points);
-        diagnostics.count("iterations", self.iterations);
-        diagnostics.count("splits", self.splits);
-        diagnostics.count("dropped_clusters", self.dropped);
-        diagnostics.count("shrinking_balls", self.balls);
-        diagnostics.count("balls_at_the_step_limit", self.at_the_step_limit);
-        diagnostics.count("balls_stopped_on_the_wrong_side", self.in_front);
-        diagnostics.count("spheres_left_uncorrected", self.uncorrected);
-        // Counts are whole numbers: billionths of a squared diagonal.
-        diagnostics.count("total_error_in_billionths", (self.total_error * 1e9).round() as usize);
     }
 }
 

@@ -1,7 +1,6 @@
 //! The surface as points with areas, normals, tangent planes and adjacency.
 
 use std::f64::consts::PI;
-use std::ops::Range;
 
 use medial::Vec3;
 use medial::complex::Sphere;
@@ -72,7 +71,7 @@ struct Unplaced {
     position: Vec3,
     area: f64,
     normal: Vec3,
-    planes: Range<usize>,
+    planes: Vec<Plane>,
 }
 
 impl SurfacePoints {
@@ -98,13 +97,13 @@ impl SurfacePoints {
 
     /// Points with one tangent plane each, adjacent to `neighbours` nearest ones, themselves among them.
     pub fn of_oriented(oriented: &[Oriented], neighbours: usize) -> Self {
-        let unplaced = oriented.iter().enumerate().map(|(place, point)| {
-            let &Oriented { position, normal, area } = point;
-            Unplaced { position, area, normal, planes: place..place + 1 }
+        let unplaced = oriented.iter().map(|&Oriented { position, normal, area }| Unplaced {
+            position,
+            area,
+            normal,
+            planes: vec![Plane { normal, share: 1.0 }],
         });
-        let planes: Vec<_> =
-            oriented.iter().map(|point| Plane { normal: point.normal, share: 1.0 }).collect();
-        let (mut points, _) = Self::placed(&unplaced.collect::<Vec<_>>(), &planes);
+        let (mut points, _) = Self::placed(&unplaced.collect::<Vec<_>>());
         let count = neighbours.min(points.len());
         let ids = nearest(&points.positions, points.area(), count);
         points.links = links_of(&ids, count);
@@ -123,24 +122,17 @@ impl SurfacePoints {
                 around[corner as usize].push(vectors[face]);
             }
         }
-        let (mut unplaced, mut planes) = (Vec::new(), Vec::new());
-        for (&position, vectors) in mesh.vertices.iter().zip(&around) {
+        let unplaced = mesh.vertices.iter().zip(&around).map(|(&position, vectors)| {
             let area: f64 = vectors.iter().map(|v| v.length()).sum();
             // Weighted by area, as the vectors are as long as their faces are large.
             let normal = vectors.iter().sum::<Vec3>().normalize_or_zero();
-            let before = planes.len();
-            planes.extend(vectors.iter().map(|vector| Plane {
+            let planes = vectors.iter().map(|vector| Plane {
                 normal: vector.normalize_or_zero(),
                 share: vector.length() / area,
-            }));
-            unplaced.push(Unplaced {
-                position,
-                area: area / 3.0,
-                normal,
-                planes: before..planes.len(),
             });
-        }
-        let (mut points, place_of) = Self::placed(&unplaced, &planes);
+            Unplaced { position, area: area / 3.0, normal, planes: planes.collect() }
+        });
+        let (mut points, place_of) = Self::placed(&unplaced.collect::<Vec<_>>());
         let mut faces: Vec<[u32; 3]> =
             mesh.faces.iter().map(|face| face.map(|v| place_of[v as usize])).collect();
         // Faces whose corner is left out join no points.
@@ -151,7 +143,7 @@ impl SurfacePoints {
 
     /// The points along the curve, without adjacency, and the place of each on it, `u32::MAX` where it is
     /// left out.
-    fn placed(unplaced: &[Unplaced], planes: &[Plane]) -> (Self, Vec<u32>) {
+    fn placed(unplaced: &[Unplaced]) -> (Self, Vec<u32>) {
         let kept: Vec<u32> =
             (0..unplaced.len() as u32).filter(|&v| unplaced[v as usize].area > 0.0).collect();
         let positions: Vec<Vec3> = kept.iter().map(|&v| unplaced[v as usize].position).collect();
@@ -162,17 +154,17 @@ impl SurfacePoints {
         let ordered = order.iter().map(|&v| &unplaced[v as usize]);
         let positions: Vec<Vec3> = ordered.clone().map(|point| point.position).collect();
         let mut first_plane = vec![0];
-        let mut placed_planes = Vec::with_capacity(planes.len());
+        let mut planes = Vec::new();
         for point in ordered.clone() {
-            placed_planes.extend_from_slice(&planes[point.planes.clone()]);
-            first_plane.push(placed_planes.len() as u32);
+            planes.extend_from_slice(&point.planes);
+            first_plane.push(planes.len() as u32);
         }
         let groups: Vec<Sphere> = positions.chunks(GROUP).map(ball_around).collect();
         let points = Self {
             areas: ordered.clone().map(|point| point.area).collect(),
             normals: ordered.map(|point| point.normal).collect(),
             first_plane,
-            planes: placed_planes,
+            planes,
             links: Vec::new(),
             local: Locality::Edges,
             first: kept.first().map_or(0, |&v| place_of[v as usize]),

@@ -6,7 +6,7 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
 use medial::shape::{Shape, ShapeError};
 use medial::simplifier::RunContext;
-use medial::surface::{Ball, End, InsideTest, Side, TriangleBvh, shrinking_ball};
+use medial::surface::{InsideTest, Side, TriangleBvh, shrinking_ball};
 use rayon::prelude::*;
 
 use super::energy::{Energy, Lanes};
@@ -38,24 +38,8 @@ pub(super) struct VariationalSampling<'a> {
     pub spheres: Vec<Sphere>,
     /// For each point its sphere.
     pub labels: Vec<u32>,
-    pub tally: Tally,
-}
-
-/// Counts of events in the iteration.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Tally {
+    /// Number of rounds so far.
     pub iterations: usize,
-    pub splits: usize,
-    pub dropped: usize,
-    /// Shrinking balls, and those of them that reached the step limit or stopped at a point in front of
-    /// the surface.
-    pub balls: usize,
-    pub at_the_step_limit: usize,
-    pub in_front: usize,
-    /// Fitted spheres that no ball could be found for; they stayed as they were.
-    pub uncorrected: usize,
-    /// The sum of `E_s` of the last round, in squared diagonals.
-    pub total_error: f64,
 }
 
 /// Why the rounds ended.
@@ -75,16 +59,14 @@ impl<'a> VariationalSampling<'a> {
         let energy = Energy { lambda: params.lambda };
         let residuals = Residuals::new(points, energy);
         let labels = vec![NONE; points.len()];
-        let mut tally = Tally::default();
-        let ball = match params.points {
+        let first = match params.points {
             Points::Samples => solid.ball_at(points, points.first as usize),
             _ => largest_ball(points, solid),
         };
-        ball.iter().for_each(|ball| tally.count(ball));
         // Any sphere will do: the first refit leaves nothing of it but its basin of attraction.
         let somewhere = Sphere::new(points.positions[points.first as usize], 0.0);
-        let spheres = vec![ball.map_or(somewhere, |ball| ball.sphere)];
-        Self { points, solid, energy, residuals, params, spheres, labels, tally }
+        let spheres = vec![first.unwrap_or(somewhere)];
+        Self { points, solid, energy, residuals, params, spheres, labels, iterations: 0 }
     }
 
     /// Rounds until there are `target` spheres, at rest.
@@ -93,7 +75,7 @@ impl<'a> VariationalSampling<'a> {
     /// When the run is cancelled.
     pub fn run(&mut self, target: usize, run: &RunContext) -> Result<Ended> {
         let at_rest = AT_REST * self.solid.side * self.solid.side;
-        let (mut most, mut without_gain) = (0, 0);
+        let (mut most, mut without_gain, mut before) = (0, 0, 0.0);
         let last = self.params.iterations - 1;
         for round in 0..=last {
             run.step(self.spheres.len().min(target), target)?;
@@ -101,9 +83,8 @@ impl<'a> VariationalSampling<'a> {
             self.refit_and_correct(&clusters);
             let misfits = misfits(self.points, self.energy, &self.spheres, &clusters);
             let total: f64 = misfits.iter().map(|misfit| misfit.mean).sum();
-            let change = (total - self.tally.total_error).abs();
-            self.tally.total_error = total;
-            self.tally.iterations = round + 1;
+            let change = (total - std::mem::replace(&mut before, total)).abs();
+            self.iterations = round + 1;
             let missing = target.saturating_sub(self.spheres.len());
             if missing == 0 && change < at_rest {
                 return Ok(Ended::AtRest);
@@ -127,41 +108,24 @@ impl<'a> VariationalSampling<'a> {
     /// Step 1.
     fn cluster(&mut self) -> Clusters {
         assign(self.points, self.energy, &self.spheres, &mut self.labels);
-        let before = self.spheres.len();
         // The authors drop fewer than 4 points, CGAL fewer than 5.
         let least = if self.params.points == Points::Samples { 5 } else { 4 };
-        let clusters = drop_small(&mut self.spheres, &mut self.labels, least);
-        self.tally.dropped += before - self.spheres.len();
-        clusters
+        drop_small(&mut self.spheres, &mut self.labels, least)
     }
 
-    /// Steps 2 and 3.
+    /// Steps 2 and 3. A fitted sphere without a medial ball stays as it was.
     fn refit_and_correct(&mut self, clusters: &Clusters) {
         let Self { points, solid, residuals, .. } = self;
         let shortest = SHORTEST_STEP * solid.side;
-        let balls = self.spheres.par_iter().enumerate().map(|(s, &sphere)| {
-            let fitted = refit(points, residuals, clusters.of(s), sphere, shortest);
-            solid.corrected(points, fitted.centre)
+        self.spheres.par_iter_mut().enumerate().for_each(|(s, sphere)| {
+            let fitted = refit(points, residuals, clusters.of(s), *sphere, shortest);
+            *sphere = solid.corrected(points, fitted.centre).unwrap_or(*sphere);
         });
-        let balls: Vec<Option<Ball>> = balls.collect();
-        for (sphere, ball) in self.spheres.iter_mut().zip(balls) {
-            match ball {
-                Some(ball) => {
-                    self.tally.count(&ball);
-                    *sphere = ball.sphere;
-                }
-                None => self.tally.uncorrected += 1,
-            }
-        }
     }
 
     /// Step 5: the sphere stays; the medial ball of the worst point of its cluster joins it.
     fn split(&mut self, worst: u32) {
-        if let Some(ball) = self.solid.ball_at(self.points, worst as usize) {
-            self.tally.count(&ball);
-            self.tally.splits += 1;
-            self.spheres.push(ball.sphere);
-        }
+        self.spheres.extend(self.solid.ball_at(self.points, worst as usize));
     }
 
     /// The complex of the last round's clusters.
@@ -175,21 +139,13 @@ impl<'a> VariationalSampling<'a> {
     }
 }
 
-impl Tally {
-    fn count(&mut self, ball: &Ball) {
-        self.balls += 1;
-        self.at_the_step_limit += usize::from(ball.end == End::StepLimit);
-        self.in_front += usize::from(ball.end == End::InFront);
-    }
-}
-
 /// The largest medial ball of a point, that of the smallest id of equal ones.
-fn largest_ball(points: &SurfacePoints, solid: &Solid<'_>) -> Option<Ball> {
-    let balls: Vec<Option<Ball>> =
+fn largest_ball(points: &SurfacePoints, solid: &Solid<'_>) -> Option<Sphere> {
+    let balls: Vec<Option<Sphere>> =
         (0..points.len()).into_par_iter().map(|v| solid.ball_at(points, v)).collect();
     // `max_by` takes the last of equals: backwards that is the smallest id.
     let balls = balls.into_iter().flatten().rev();
-    balls.max_by(|a, b| a.sphere.radius.total_cmp(&b.sphere.radius))
+    balls.max_by(|a, b| a.radius.total_cmp(&b.radius))
 }
 
 // ----------------------------------------------------------------------------
@@ -406,17 +362,17 @@ impl<'s> Solid<'s> {
     }
 
     /// The medial ball of a surface point; `None` where the faces around a vertex cancel.
-    pub fn ball_at(&self, points: &SurfacePoints, v: usize) -> Option<Ball> {
+    pub fn ball_at(&self, points: &SurfacePoints, v: usize) -> Option<Sphere> {
         let (p, n) = (points.positions[v], points.normals[v]);
         if n == Vec3::ZERO {
             return None;
         }
-        Some(shrinking_ball(p, n, self.side, points.touched())).filter(is_medial)
+        self.medial_ball(points, p, n)
     }
 
     /// The medial ball of the surface point nearest to a fitted centre; `None` where there is none. The fitted
     /// radius has no part in it.
-    pub fn corrected(&self, points: &SurfacePoints, fitted: Vec3) -> Option<Ball> {
+    pub fn corrected(&self, points: &SurfacePoints, fitted: Vec3) -> Option<Sphere> {
         if !fitted.is_finite() {
             return None;
         }
@@ -427,12 +383,13 @@ impl<'s> Solid<'s> {
         } else {
             area_vector(self.shape.mesh(), closest.face as usize).try_normalize()?
         };
-        let ball = shrinking_ball(closest.point, outward, self.side, points.touched());
-        is_medial(&ball).then_some(ball)
+        self.medial_ball(points, closest.point, outward)
     }
-}
 
-/// Whether a ball has two contacts: one that never shrank is as large as it began.
-fn is_medial(ball: &Ball) -> bool {
-    ball.steps > 0 && ball.sphere.centre.is_finite()
+    /// The shrinking ball at a surface point, if it has two contacts: one that never shrank is as large as it
+    /// began.
+    fn medial_ball(&self, points: &SurfacePoints, p: Vec3, outward: Vec3) -> Option<Sphere> {
+        let ball = shrinking_ball(p, outward, self.side, points.touched());
+        (ball.steps > 0 && ball.sphere.centre.is_finite()).then_some(ball.sphere)
+    }
 }

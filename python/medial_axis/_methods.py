@@ -58,8 +58,6 @@ class Pmat(Options, total=False):
 class Hem(Options, total=False):
     """Options of `hem`."""
 
-    inside: Literal["depth", "surface"]
-
 
 class Sat(Options, total=False):
     """Options of `sat`."""

@@ -8,7 +8,7 @@ use medial::complex::{self, Contacts, Look, MedialMesh, ReadOptions, SphereValue
 use medial::geometry::Sphere;
 use medial::metrics::JudgeOptions;
 use medial::shape::{Shape, ShapeOptions};
-use medial::surface::{self, Loaded, Normalisation, SurfaceReport, TriMesh};
+use medial::surface::{self, Loaded, SurfaceReport, TriMesh};
 use medial_run::axis::{AxisOptions, read_axis};
 use medial_run::evaluate::Evaluator;
 use medial_run::reconstruct::union_boundary;
@@ -49,12 +49,8 @@ impl Axis {
 
     /// The initial medial mesh of a shape, which has normalised units.
     pub fn initial(mesh: &MedialMesh, shape: Shape) -> Self {
-        Self { is_initial: true, ..Self::of_normal(mesh, shape) }
-    }
-
-    /// A medial mesh in the normalised units of a shape.
-    fn of_normal(mesh: &MedialMesh, shape: Shape) -> Self {
-        Self::new(in_input_units(mesh, shape.normalisation()), Some(shape))
+        let mesh = mesh.to_input(shape.normalisation());
+        Self { is_initial: true, ..Self::new(mesh, Some(shape)) }
     }
 
     /// The start of a method: the shape, with this mesh as the initial one.
@@ -65,11 +61,6 @@ impl Axis {
         let view = shape.view();
         Ok(if self.is_initial { view } else { view.with_initial(&self.mesh) })
     }
-}
-
-/// A medial mesh of normalised units in those of the input.
-pub fn in_input_units(mesh: &MedialMesh, units: &Normalisation) -> MedialMesh {
-    mesh.to_input(units)
 }
 
 /// Contact samples and their indices, words of the shape's options, whether it is the initial medial mesh.

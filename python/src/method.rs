@@ -26,7 +26,7 @@ use pyo3::prelude::*;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-use crate::axis::{Axis, in_input_units};
+use crate::axis::Axis;
 use crate::calls::{Call, Failure, Kind, long, of_points, of_rows, points};
 
 /// The Python module that calls the classes.
@@ -141,7 +141,7 @@ pub fn simplify(
         };
         let RunOutput { simplify, result, search } =
             request.run(level).map_err(Failure::of_fault)?;
-        let mesh = in_input_units(&result.mesh, start.normalisation());
+        let mesh = result.mesh.to_input(start.normalisation());
         let asked = simplify.level.to_string();
         let facts = json!({ "asked": asked, "simplify": simplify, "max_error": search });
         Ok((mesh, facts.to_string()))

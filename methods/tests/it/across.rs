@@ -15,7 +15,6 @@ fn wrong_parameters_are_refused_by_name() {
         ("lambda", "variant=facet"),
         ("dey-zhao", "theta=0 theta=90 rho=0 rho=-8"),
         ("qmat", "k=-1 k_boundary=-1 topology_from=some"),
-        ("hem", "inside=both outside=depth"),
         ("tam-heidrich", "t_v=-1 t_v=1,many t_v=[1,101] drop=2 t_t_rounds=1.5"),
         ("coverage-axis", "dilation=0 select=all"),
         ("vmas", "lambda=0 lambda=1.5 iterations=0 points=faces"),
@@ -139,7 +138,6 @@ fn the_number_of_threads_changes_nothing() {
     let vertices = [("points", "vertices")];
     for (method, set) in [
         ("hem", &[][..]),
-        ("hem", &[("inside", "surface")]),
         ("pmat", &[]),
         ("vmas", &[]),
         ("vmas", &vertices),

@@ -10,7 +10,7 @@ use medial::simplifier::{Level, MedialSimplifier, RunContext, Simplified};
 use medial::surface::{self, TriMesh};
 use medial_methods::vmas;
 
-use crate::common::{built_in, default_shape, params, shape_of};
+use crate::common::{built_in, cuboid, default_shape, params, shape_of};
 
 fn at(shape: &Shape, text: &str, level: Level) -> Simplified {
     let vmas = vmas::method();
@@ -130,11 +130,7 @@ fn scale_and_rotation_change_nothing_but_scale_and_rotation() {
 
 #[test]
 fn fewer_spheres_than_requested_have_a_warning() {
-    let corner = |k: u32| Vec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
-    let sides =
-        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let faces = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    let cube = TriMesh { vertices: (0..8).map(corner).collect(), faces };
+    let cube = cuboid(Vec3::ONE);
     let tetrahedron = TriMesh {
         vertices: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
         faces: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
