@@ -53,10 +53,9 @@ pub struct UnionVertex {
 /// let boundary = UnionBoundary::new(&complex);
 /// // Two triangles fill the rectangle, each has a point above and one below: four spheres meet there.
 /// assert_eq!(boundary.vertices().len(), 4);
-/// let merged = boundary.merge();
-/// assert_eq!(merged.points().len(), 2);
-/// assert_eq!(merged.balls(0), [0, 1, 2, 3]);
-/// assert!(merged.points().iter().all(|p| p.distance(Vec3::new(3.0, 4.0, 12.0 * p.z.signum())) < 1e-14));
+/// let (points, point_of) = boundary.merge();
+/// assert_eq!((points.len(), point_of.len()), (2, 4));
+/// assert!(points.iter().all(|p| p.distance(Vec3::new(3.0, 4.0, 12.0 * p.z.signum())) < 1e-14));
 /// # Ok::<(), medial_geometry::TriangulationError>(())
 /// ```
 #[derive(Clone, Debug)]
