@@ -628,7 +628,8 @@ impl TightParams {
 // The level by error: few spheres whose two-sided error a certificate holds within a bound.
 //
 // One descent through the counts, until the largest error at samples says that the bound is near. From its meshes
-// the rounds are made for the count that is reached, and for a few that its error foretells.
+// the rounds are made for the count that is reached, and for a few that its error foretells, which continue from the
+// smallest mesh within the bound.
 
 /// Largest error at samples at which the descent ends, in errors aimed at. Swaps and rounds lower it by
 /// about this factor.
@@ -648,8 +649,8 @@ const MORE: f64 = 1.3;
 /// Smallest and largest factor of the count after a miss.
 const GROWTH: [f64; 2] = [1.15, 1.6];
 
-/// Smallest share of a count within the bound that the next count has.
-const SHARE: f64 = 0.35;
+/// Smallest and largest share of a count within the bound that the next count has.
+const SHARES: [f64; 2] = [0.35, 0.87];
 
 /// Range of errors that swaps and rounds can bring to the bound, in bounds.
 const NEAR: [f64; 2] = [0.5, WATCHED];
@@ -662,7 +663,7 @@ const CLOSE: f64 = 0.97;
 
 /// Limit of the tried counts once one is within the bound.
 const TRIALS: usize = 4;
-/// Ratio of a count within the bound to the one above the largest miss, up to which none between them is tried.
+/// Ratio of a count within the bound to the largest miss, up to which no count between them is tried.
 const APART: f64 = 1.15;
 
 /// Measured error that is aimed at, as a share of the bound.
@@ -706,11 +707,11 @@ impl Within<'_> {
         // The state, and the count and measured error of it and of the largest count that missed the bound.
         let (mut within, mut held, mut missed) = (None, None, None::<(usize, f64)>);
         let (mut trials, mut misses) = (0, 0);
-        // The mesh of fewest spheres within the bound, up to the next miss: trials continue from it.
+        // The mesh of fewest spheres within the bound: the next trials continue from it. Without rounds, far within the
+        // bound, it does so up to the first miss: it can miss a bound that another mesh of its size meets.
         let mut smallest: Option<MedialMesh> = None;
         loop {
             let count = wanted;
-            let is_continued = smallest.is_some();
             let mut state = self.with(&meshes, smallest.as_ref(), count)?;
             let now = (state.mesh.spheres.len(), state.error);
             // Trials far from the bound end early and cost little.
@@ -723,20 +724,18 @@ impl Within<'_> {
             least = least.min(state.error);
             if state.error <= bound {
                 if held.is_none_or(|(spheres, _)| now.0 < spheres) {
-                    smallest = Some(state.mesh.clone());
+                    if missed.is_none() || !is_far(bound, now.1) {
+                        smallest = Some(state.mesh.clone());
+                    }
                     (within, held) = (Some(state), Some(now));
                 }
                 misses = 0;
-            } else {
-                smallest = None;
-                // From the descent, another mesh of as many spheres may hold the bound.
-                if is_continued && now.1 < RESCUED * bound && trials < TRIALS {
-                    continue;
+            } else if missed.is_none_or(|(spheres, _)| spheres < now.0) {
+                missed = Some((now.0, now.1.max(state.error)));
+                if held.is_some_and(|(_, error)| is_far(bound, error)) {
+                    smallest = None;
                 }
-                if missed.is_none_or(|(spheres, _)| spheres < now.0) {
-                    missed = Some((now.0, now.1.max(state.error)));
-                    misses += 1;
-                }
+                misses += 1;
             }
             wanted = match (held, missed) {
                 (Some((many, _)), Some((few, _))) if many <= few + 1 => break,
@@ -749,12 +748,11 @@ impl Within<'_> {
                     } else {
                         between(held, missed, CLOSE * aim)
                     };
-                    wanted.clamp(few + 1, many - 1)
+                    wanted.min((SHARES[1] * many as f64) as usize).clamp(few + 1, many - 1)
                 }
                 (Some((spheres, error)), None) => {
-                    let share = (error / aim).powf(RATE).max(SHARE);
-                    let most = (spheres as f64 / APART).ceil() as usize - 1;
-                    ((spheres as f64 * share) as usize).min(most)
+                    let share = (error / aim).powf(RATE).clamp(SHARES[0], SHARES[1]);
+                    (spheres as f64 * share) as usize
                 }
                 (None, Some((spheres, _))) if spheres >= finest => break,
                 (None, Some((spheres, error))) => {
@@ -766,8 +764,7 @@ impl Within<'_> {
             // No collapse is left that keeps the homotopy type: fewer spheres are out of reach.
             let is_last = now.0 > count;
             let is_enough = |(spheres, _)| {
-                let is_close =
-                    missed.is_some_and(|(few, _)| spheres as f64 <= APART * (few + 1) as f64);
+                let is_close = missed.is_some_and(|(few, _)| spheres as f64 <= APART * few as f64);
                 wanted == 0 || is_last || is_close || trials >= TRIALS
             };
             if held.is_some_and(is_enough) {
