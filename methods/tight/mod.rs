@@ -668,7 +668,7 @@ const APART: f64 = 1.15;
 
 /// Measured error that is aimed at, as a share of the bound.
 const AIM: f64 = 0.97;
-/// Width of the certificate, as a share of what the measured error leaves of the bound.
+/// Width of the certificate, as a share of the difference between the bound and the measured error.
 const WIDTH: f64 = 0.2;
 /// Smallest and largest width of the certificate, in bounds. The narrower, the slower.
 const WIDTHS: [f64; 2] = [0.002, 0.1];

@@ -629,7 +629,7 @@ mod tests {
     use super::*;
     use crate::shape::ShapeOptions;
     use crate::surface::fixtures::cuboid;
-    use crate::surface::validate;
+    use crate::surface::{TriMesh, validate};
 
     /// A block of 3 by 2 by 1 somewhere, and its initial medial mesh.
     fn block() -> (Shape, MedialMesh) {
@@ -756,20 +756,37 @@ mod tests {
         assert_eq!(shape.fit(&initial).unwrap().source, FitSource::Units);
     }
 
-    /// Spheres that contain a bar with a margin: with a scale of 0.87 their radii would fit, and its ends be lost.
+    /// A globe of meridians and parallels with a radius of 1 around the origin.
+    fn globe() -> TriMesh {
+        let (around, down) = (24, 12);
+        let angle = |k: u32, of: u32| std::f64::consts::TAU * f64::from(k) / f64::from(of);
+        let at = |i: u32, j: u32| {
+            let ((y, x), (sin, cos)) = (angle(i, around).sin_cos(), angle(j, 2 * down).sin_cos());
+            Vec3::new(x * sin, y * sin, cos)
+        };
+        let rings = (1..down).flat_map(|j| (0..around).map(move |i| at(i, j)));
+        let vertices = [Vec3::Z, -Vec3::Z].into_iter().chain(rings).collect();
+        let id = |i: u32, j: u32| 2 + (j - 1) * around + i % around;
+        let caps = (0..around)
+            .flat_map(|i| [[0, id(i, 1), id(i + 1, 1)], [1, id(i + 1, down - 1), id(i, down - 1)]]);
+        let sides =
+            (1..down - 1).flat_map(|j| (0..around).map(move |i| (i, j))).flat_map(|(i, j)| {
+                let [a, b, c, d] = [id(i, j), id(i, j + 1), id(i + 1, j + 1), id(i + 1, j)];
+                [[a, b, c], [a, c, d]]
+            });
+        TriMesh { vertices, faces: caps.chain(sides).collect() }
+    }
+
+    /// A ball that contains a globe with a margin: with a smaller scale its radius would fit.
     #[test]
     fn a_margin_of_the_radii_is_no_change_of_units() {
-        let bar = cuboid(Vec3::ZERO, Vec3::new(10.0, 2.0, 2.0));
-        let report = validate(&bar).unwrap();
-        let shape = Shape::new("bar", &bar, report, ShapeOptions::default()).unwrap();
-        let row = |radius: f64| {
-            let spheres =
-                (2..=8).map(|i| Sphere::new(Vec3::new(f64::from(i) * 1.125, 1.0, 1.0), radius));
-            let edges = (0..6).map(|i| [i, i + 1]).collect();
-            MedialMesh::from_simplices(spheres.collect(), edges, vec![]).unwrap()
-        };
+        let globe = globe();
+        let report = validate(&globe).unwrap();
+        let shape = Shape::new("globe", &globe, report, ShapeOptions::default()).unwrap();
         for radius in [1.15, 1.3] {
-            assert_eq!(shape.fit_if_needed(&row(radius)).unwrap(), None, "{radius}");
+            let ball = Sphere::new(Vec3::ZERO, radius);
+            let mesh = MedialMesh::from_simplices(vec![ball], vec![], vec![]).unwrap();
+            assert_eq!(shape.fit_if_needed(&mesh).unwrap(), None, "{radius}");
         }
     }
 

@@ -45,8 +45,7 @@ pub struct Hierarchy {
 }
 
 impl Hierarchy {
-    /// The hierarchy of a mesh in canonical form under `steps`, first to last, each of which collapses an edge of its
-    /// stage.
+    /// The hierarchy of a mesh in canonical form. Each step, first to last, collapses an edge of its stage.
     ///
     /// # Panics
     /// If a step removes a sphere that is gone, or keeps one.

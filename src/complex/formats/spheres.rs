@@ -527,8 +527,11 @@ fn sphere(item: &Value) -> Result<Sphere, String> {
         let number = value.as_f64().filter(|number| number.is_finite());
         number.ok_or_else(|| format!("the {field} {} is not a finite number", text(value)))
     };
-    let mut keys = item.as_object().into_iter().flat_map(Map::keys);
-    if let Some(key) = keys.find(|key| key.parse::<f64>().is_ok()) {
+    // YAML reads `radius: 0,5` as a radius of 0 and a key 5 without a value.
+    let mut entries = item.as_object().into_iter().flatten();
+    if let Some((key, _)) =
+        entries.find(|(key, value)| value.is_null() && key.parse::<f64>().is_ok())
+    {
         return Err(format!("the key {} is a number; write decimal points", quoted(key)));
     }
     let mut centres = CENTRES.iter().filter_map(|key| item.get(key));
