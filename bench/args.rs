@@ -85,18 +85,12 @@ impl SubstrateArguments {
     }
 
     /// The options of a shape.
-    ///
-    /// # Errors
-    /// When the sampling is not understood.
     pub fn shape_options(&self) -> Result<ShapeOptions, Failure> {
         let dual = self.dual.unwrap_or_default();
         Ok(ShapeOptions { sampling: self.sampling()?, dual })
     }
 
     /// Sets the given options in a study.
-    ///
-    /// # Errors
-    /// When the sampling is not understood.
     pub fn apply(&self, study: &mut Study) -> Result<(), Failure> {
         // Only given options: a default of the command line must not override the study file.
         study.seed = self.seed.unwrap_or(study.seed);
@@ -183,25 +177,16 @@ impl MeasureArguments {
 pub type MeshArgument = PathBuf;
 
 /// Reads a positive and finite number.
-///
-/// # Errors
-/// When it is none.
 pub fn positive(text: &str) -> Result<f64, String> {
     number(text, |x| x > 0.0, "a positive number")
 }
 
 /// Reads a fraction from 0 on.
-///
-/// # Errors
-/// When it is none.
 pub fn share(text: &str) -> Result<f64, String> {
     number(text, |x| x >= 0.0, "a non-negative fraction, for example 0.05")
 }
 
 /// Reads a positive fraction of at most 1.
-///
-/// # Errors
-/// When it is none.
 pub fn fraction(text: &str) -> Result<f64, String> {
     number(text, |x| x > 0.0 && x <= 1.0, "a number above 0 and at most 1")
 }
@@ -213,9 +198,6 @@ fn number(text: &str, is_wanted: fn(f64) -> bool, expected: &str) -> Result<f64,
 }
 
 /// Reads `KEY=VALUE`.
-///
-/// # Errors
-/// When there is no `=`.
 pub fn key_value(text: &str) -> Result<(String, String), String> {
     let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE")?;
     Ok((key.to_owned(), value.to_owned()))
@@ -228,10 +210,7 @@ pub fn params(words: &[(String, String)]) -> Params {
     params
 }
 
-/// The method with an id.
-///
-/// # Errors
-/// When no method has it; the message lists the ids.
+/// The method with an id. Fails when no method has it; the message lists the ids.
 pub fn method<'r>(registry: &'r Registry, id: &str) -> Result<&'r Entry, Failure> {
     registry.entry(id).ok_or_else(|| Failure::usage(registry.no_such(id)))
 }

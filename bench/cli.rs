@@ -22,18 +22,15 @@ use crate::study::registry::Registry;
 /// Simplify the 3D medial axis transform, and compare the published methods that do.
 #[derive(Debug, Parser)]
 #[command(name = "medial", version, arg_required_else_help = true)]
-pub struct Cli {
-    /// Options of every verb.
+struct Cli {
     #[command(flatten)]
-    pub global: Global,
-    /// The verb.
+    global: Global,
     #[command(subcommand)]
-    pub verb: Verb,
+    verb: Verb,
 }
 
-/// The verbs.
 #[derive(Debug, Subcommand)]
-pub enum Verb {
+enum Verb {
     /// Run methods on meshes, measure the results, write tables, plots and a page.
     Compare(Box<cmd::compare::Arguments>),
     /// Print counts, defects and topology of a mesh.

@@ -1,4 +1,4 @@
-//! The exit codes of the verbs, and their error messages.
+//! The exit codes of the verbs, and the error of all modules: a code and a message.
 
 use std::fmt::Display;
 use std::path::Path;
@@ -6,12 +6,8 @@ use std::process::ExitCode;
 
 use medial_run::axis::AxisError;
 use medial_run::input::InputError;
+use medial_run::journal::JournalError;
 use medial_run::library::PublicError;
-
-use crate::exec::RunError;
-use crate::store::StoreError;
-use crate::study::StudyError;
-use crate::study::edition::EditionError;
 
 /// Exit codes of the command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,19 +68,8 @@ impl Failure {
     }
 }
 
-impl From<StudyError> for Failure {
-    fn from(error: StudyError) -> Self {
-        match error {
-            StudyError::Input(error) => error.into(),
-            // A file is input, its values replace options.
-            StudyError::File { .. } => Self::input(error),
-            _ => Self::usage(error),
-        }
-    }
-}
-
-impl From<StoreError> for Failure {
-    fn from(error: StoreError) -> Self {
+impl From<JournalError> for Failure {
+    fn from(error: JournalError) -> Self {
         Self::input(error)
     }
 }
@@ -95,35 +80,11 @@ impl From<AxisError> for Failure {
     }
 }
 
-impl From<RunError> for Failure {
-    fn from(error: RunError) -> Self {
-        let code = match error {
-            RunError::Interrupted => Exit::Interrupted,
-            // No worker, no result: not the fault of an input.
-            RunError::Start(_) => Exit::NothingMeasured,
-            RunError::Store(_) | RunError::Foreign { .. } => Exit::Input,
-        };
-        Self { code, message: error.to_string() }
-    }
-}
-
 impl From<PublicError> for Failure {
     fn from(error: PublicError) -> Self {
         match error {
             // The rest are names of the command line.
             PublicError::File { .. } => Self::input(error),
-            _ => Self::usage(error),
-        }
-    }
-}
-
-impl From<EditionError> for Failure {
-    fn from(error: EditionError) -> Self {
-        match error {
-            EditionError::File { .. }
-            | EditionError::Changed { .. }
-            | EditionError::Definitions { .. } => Self::input(error),
-            // The rest are options of the command line.
             _ => Self::usage(error),
         }
     }

@@ -10,20 +10,15 @@ use medial_run::input::{Input, Source};
 
 use crate::exit::Failure;
 
-/// Reads a surface or makes a built-in one, and the shape of it. Errors name the surface.
-///
-/// # Errors
-/// When it does not exist, is refused, or has no extent.
+/// Reads a surface or makes a built-in one, and the shape of it. Errors name the surface. Fails when it does not exist,
+/// is refused, or has no extent.
 pub fn shape_of(mesh: &Path, options: ShapeOptions) -> Result<(Input, Shape), Failure> {
     let input = Input::load(&Source::parse(mesh)?)?;
     let shape = input.shape(options).map_err(|error| Failure::at(mesh, error))?;
     Ok((input, shape))
 }
 
-/// Opens a file of a user for reading.
-///
-/// # Errors
-/// When it cannot be opened, or is a pipe or device, which may never end.
+/// Opens a file of a user for reading. Fails when it cannot be opened, or is a pipe or device, which may never end.
 pub fn open_regular(path: &Path) -> Result<File, Failure> {
     let file = medial::check_regular(path).and_then(|()| File::open(path));
     file.map_err(|error| Failure::at(path, error))
@@ -43,10 +38,8 @@ pub fn left_out(path: &Path, mesh: &MedialMesh) -> Option<String> {
     }
 }
 
-/// Refuses an output that could not be written, before the work for it is done.
-///
-/// # Errors
-/// When the extension is none of a medial mesh, or the folder does not exist.
+/// Refuses an output that could not be written, before the work for it is done. Fails when the extension is none of a
+/// medial mesh, or the folder does not exist.
 pub fn check_output(output: Option<&Path>) -> Result<(), Failure> {
     let Some(path) = output else { return Ok(()) };
     // Methods can take hours: a wrong name must fail before them.
@@ -58,9 +51,6 @@ pub fn check_output(output: Option<&Path>) -> Result<(), Failure> {
 pub const SURFACES: [&str; 3] = ["ply", "off", "obj"];
 
 /// Refuses a file of a kind that is not written.
-///
-/// # Errors
-/// When the extension is none of those known.
 pub fn check_extension(path: &Path, known: &[&str]) -> Result<(), Failure> {
     let extension = extension(path);
     if known.contains(&extension.as_str()) {
@@ -72,9 +62,6 @@ pub fn check_extension(path: &Path, known: &[&str]) -> Result<(), Failure> {
 }
 
 /// Refuses a file in a folder that does not exist.
-///
-/// # Errors
-/// When the folder does not exist.
 pub fn check_folder(path: &Path) -> Result<(), Failure> {
     match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         Some(folder) if !folder.is_dir() => Err(Failure::input(format!(
@@ -86,10 +73,8 @@ pub fn check_folder(path: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Refuses an output that would replace a file that the command reads, or its other output.
-///
-/// # Errors
-/// When both paths lead to the same file.
+/// Refuses an output that would replace a file that the command reads, or its other output. Fails when both paths lead
+/// to the same file.
 pub fn check_apart<'a>(
     output: Option<&Path>,
     others: impl IntoIterator<Item = &'a Path>,
@@ -111,9 +96,6 @@ pub fn check_apart<'a>(
 }
 
 /// Writes a file, complete or not at all.
-///
-/// # Errors
-/// When it cannot be written; the message names it.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     medial::write_atomically(path, |out| out.write_all(bytes))
         .map_err(|error| Failure::at(path, error))

@@ -14,22 +14,22 @@
 //! | [`args`], [`exit`], [`output`], [`files`], [`interrupt`] | shared by the verbs |
 //! | [`cmd`], [`cli`] | one file for each verb, their list |
 
-pub mod args;
+mod args;
 pub mod check;
 pub mod cli;
-pub mod cmd;
-pub mod exec;
+mod cmd;
+mod exec;
 pub mod exit;
-pub mod files;
+mod files;
 pub mod host;
-pub mod interrupt;
-pub mod output;
+mod interrupt;
+mod output;
 pub mod plugin;
 pub mod process_tree;
-pub mod progress;
+mod progress;
 pub mod provenance;
-pub mod rebuild;
-pub mod store;
+mod rebuild;
+mod store;
 pub mod study;
 
 pub use cli::{main_hosted, main_with};

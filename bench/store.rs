@@ -11,16 +11,16 @@ use std::{fs, io};
 
 use medial::{read_regular, read_regular_text};
 use medial_run::item::Item;
-use medial_run::journal::{Journal, JournalError, parse_records};
+use medial_run::journal::{Journal, parse_records};
 use medial_run::level::Target;
 use medial_run::record::{Record, Status, file_inside};
+
+use crate::exit::Failure;
 
 /// Name of the append-only list of records of a comparison.
 pub const RESULTS: &str = "results.jsonl";
 /// Name of the folder of the results as `.ma`.
 pub const AXES: &str = "axes";
-/// Folder of the requests that ended their workers.
-pub const AGAIN: &str = "again";
 /// Name of the page of a report.
 pub const PAGE: &str = "index.html";
 /// Name of the file that names the process that holds a store.
@@ -30,7 +30,7 @@ const HOLDER: &str = "process ";
 /// Names in the folder itself that are written or removed.
 const FILES: [&str; 6] = [LOCK, RESULTS, PAGE, "header.json", "study.toml", "results.csv"];
 /// Names of the folders in it that belong to this program.
-const FOLDERS: [&str; 6] = [AGAIN, AXES, "pictures", "plots", "tables", "views"];
+const FOLDERS: [&str; 5] = [AXES, "pictures", "plots", "tables", "views"];
 
 /// A folder of results that this process may add to.
 pub struct Store {
@@ -48,35 +48,12 @@ pub struct Store {
     pub was_cut: bool,
 }
 
-/// The reason for which a folder cannot be used as a store.
-#[derive(Debug, thiserror::Error)]
-pub enum StoreError {
-    /// The file or folder is wrong, in use, or the file system refused.
-    #[error("{}: {why}", path.display())]
-    File {
-        /// The file or folder.
-        path: PathBuf,
-        /// Problem and advice.
-        why: String,
-    },
-    /// A record cannot be written.
-    #[error(transparent)]
-    Journal(#[from] JournalError),
-}
-
-fn wrong(path: &Path, why: impl ToString) -> StoreError {
-    StoreError::File { path: path.to_owned(), why: why.to_string() }
-}
-
 impl Store {
     /// Opens or makes a folder of results, for `journal`, one of its lists of records.
     ///
-    /// Removes temporary files of an interrupted process, and with a remark an incomplete last line.
-    ///
-    /// # Errors
-    /// When it is not a folder, has other files or a link where results are written, is not writable, or another process
-    /// holds it.
-    pub fn open(dir: &Path, journal: &str, command: &str) -> Result<Self, StoreError> {
+    /// Removes temporary files of an interrupted process, and with a remark an incomplete last line. Fails when it is
+    /// not a folder, has other files or a link where results are written, is not writable, or another process holds it.
+    pub fn open(dir: &Path, journal: &str, command: &str) -> Result<Self, Failure> {
         let entries = entries_of(dir);
         claim(dir, is_store(dir, journal), &entries)?;
         fs::create_dir_all(dir).map_err(io_error(dir))?;
@@ -97,12 +74,9 @@ impl Store {
         &self.dir
     }
 
-    /// Removes all records, the results that they name and the page. Other files in the folder belong
-    /// to the user and stay; the next report replaces its own tables and plots.
-    ///
-    /// # Errors
-    /// When a file cannot be removed.
-    pub fn clear(&mut self, journal: &str) -> Result<(), StoreError> {
+    /// Removes all records, the results that they name and the page. Other files in the folder belong to the user and
+    /// stay; the next report replaces its own tables and plots.
+    pub fn clear(&mut self, journal: &str) -> Result<(), Failure> {
         let artifacts = self.known.values().filter_map(|record| record.artifact.as_deref());
         for path in artifacts.filter_map(|artifact| artifact_path(&self.dir, artifact)) {
             // A remaining file without a record does not count as a result.
@@ -144,10 +118,7 @@ impl Store {
     }
 
     /// Adds records.
-    ///
-    /// # Errors
-    /// When they cannot be written.
-    pub fn append(&mut self, records: &[Record]) -> Result<(), StoreError> {
+    pub fn append(&mut self, records: &[Record]) -> Result<(), Failure> {
         self.added += records.len();
         Ok(self.journal.append(records)?)
     }
@@ -182,27 +153,24 @@ pub fn is_store(dir: &Path, journal: &str) -> bool {
 
 /// Refuses a folder with other files, and a folder with a link or a device among its `entries`, which this program
 /// writes or removes. The folder itself may be a link.
-///
-/// # Errors
-/// [`StoreError::File`], which names the folder or entry.
-pub fn claim(dir: &Path, is_ours: bool, entries: &[DirEntry]) -> Result<(), StoreError> {
+pub fn claim(dir: &Path, is_ours: bool, entries: &[DirEntry]) -> Result<(), Failure> {
     if dir.exists() && !dir.is_dir() {
-        return Err(wrong(dir, "not a folder"));
+        return Err(Failure::at(dir, "not a folder"));
     }
     // Requests to workers are JSON, which has no other text.
     if dir.to_str().is_none() {
-        return Err(wrong(dir, "the name is not UTF-8; choose another by --out"));
+        return Err(Failure::at(dir, "the name is not UTF-8; choose another by --out"));
     }
     if !is_ours && listed(dir).next().is_some() {
         let why = "neither empty nor a folder of results; choose another by --out";
-        return Err(wrong(dir, why));
+        return Err(Failure::at(dir, why));
     }
     for entry in entries {
         let kind = entry.file_type().map_err(io_error(&entry.path()))?;
         if !kind.is_file() && !kind.is_dir() {
             let why = "not a regular file, but results are written here; remove it, or choose \
                        another folder by --out";
-            return Err(wrong(&entry.path(), why));
+            return Err(Failure::at(&entry.path(), why));
         }
     }
     Ok(())
@@ -235,7 +203,7 @@ fn is_temporary(entry: &DirEntry) -> bool {
 }
 
 /// Takes the lock and writes the process id and the command into it.
-fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
+fn lock(dir: &Path, command: &str) -> Result<File, Failure> {
     let path = dir.join(LOCK);
     let mut options = OpenOptions::new();
     let file = options.read(true).write(true).create(true).truncate(false).open(&path);
@@ -248,7 +216,7 @@ fn lock(dir: &Path, command: &str) -> Result<File, StoreError> {
             let _ = file.read_to_string(&mut holder);
             let holder = if holder.is_empty() { "another process" } else { &holder };
             let why = "is adding results to this folder; wait for it, or choose another by --out";
-            return Err(wrong(dir, format!("{holder} {why}")));
+            return Err(Failure::at(dir, format!("{holder} {why}")));
         }
         // Some file systems have no locks; two runs into one folder go unnoticed there.
         Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
@@ -301,7 +269,7 @@ pub fn artifact_path(dir: &Path, artifact: &str) -> Option<PathBuf> {
     file_inside(dir, artifact).filter(|_| is_own)
 }
 
-fn remove(path: &Path) -> Result<(), StoreError> {
+fn remove(path: &Path) -> Result<(), Failure> {
     match fs::remove_file(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
         other => other.map_err(io_error(path)),
@@ -309,7 +277,7 @@ fn remove(path: &Path) -> Result<(), StoreError> {
 }
 
 /// Adds the path to an error of the file system.
-fn io_error(path: &Path) -> impl Fn(io::Error) -> StoreError {
+fn io_error(path: &Path) -> impl Fn(io::Error) -> Failure {
     let path = path.to_owned();
-    move |error| wrong(&path, error)
+    move |error| Failure::at(&path, error)
 }

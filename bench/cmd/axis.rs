@@ -26,10 +26,7 @@ pub struct Arguments {
     substrate: SubstrateArguments,
 }
 
-/// Runs the verb.
-///
-/// # Errors
-/// When the surface is refused, cannot be triangulated, or the output cannot be written.
+/// Runs the verb. Fails when the surface is refused, cannot be triangulated, or the output cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let options = arguments.substrate.shape_options()?;
     check_output(arguments.output.as_deref())?;

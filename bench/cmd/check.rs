@@ -9,8 +9,8 @@ use serde_json::json;
 
 use crate::args::{self, Global, key_value, positive};
 use crate::check::{Case, Outcome, cases, find};
+use crate::exec::Supervisor;
 use crate::exec::protocol::CheckItem;
-use crate::exec::{RunError, Supervisor};
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{counted, print_json, print_line};
@@ -37,11 +37,8 @@ pub struct Arguments {
     memory: Option<u64>,
 }
 
-/// Runs the verb.
-///
-/// # Errors
-/// When a method, a case or a parameter does not exist, or no worker can be started. A failed case is
-/// a line of the output and sets the exit code.
+/// Runs the verb. Fails when a method, a case or a parameter does not exist, or no worker can be started. A failed case
+/// is a line of the output and sets the exit code.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let items = arguments.items(registry)?;
     let interrupted = interrupt::listen();
@@ -51,10 +48,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let (mut counts, mut list) = ([0; 3], Vec::new());
     for (item, case) in &items {
         let begun = Instant::now();
-        let outcome = match supervisor.check(item) {
-            Err(RunError::Interrupted) => return Ok(Exit::Interrupted),
-            outcome => outcome?,
-        };
+        let outcome = supervisor.check(item)?;
         let seconds = begun.elapsed().as_secs_f64();
         let (place, end, reason, remarks) = match &outcome {
             Outcome::Passed(remarks) => (0, "ok", None, remarks.as_slice()),

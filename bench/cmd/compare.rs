@@ -14,8 +14,8 @@ use medial_run::record::{Record, Status};
 use serde_json::json;
 
 use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments, word};
+use crate::exec::Supervisor;
 use crate::exec::queue::{Contender, count, missing, refused_params, run_items};
-use crate::exec::{RunError, Supervisor};
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_line};
@@ -131,10 +131,7 @@ fn keep() -> impl TypedValueParser<Value = Keep> {
     ])
 }
 
-/// Runs the verb.
-///
-/// # Errors
-/// When the command line or the study is wrong, an input does not exist, or the results cannot be
+/// Runs the verb. Fails when the command line or the study is wrong, an input does not exist, or the results cannot be
 /// written, before any run. Refused meshes and failed methods are rows of the results.
 pub fn run(
     arguments: &Arguments,
@@ -202,7 +199,7 @@ pub fn run(
     let ended = run_items(&left, sides, global.progress(), &mut on_recorded);
     let run = side.store.added;
     // The flag has no effect from here on.
-    if interrupt::stop_listening() || matches!(ended, Err(RunError::Interrupted)) {
+    if interrupt::stop_listening() {
         if run > 0 {
             report.write(Some(pages.running), false)?;
         }

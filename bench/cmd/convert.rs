@@ -36,10 +36,8 @@ pub struct Arguments {
     look: LookArguments,
 }
 
-/// Runs the verb. Repairs surfaces and prints every repair.
-///
-/// # Errors
-/// When the input is refused, the pair of formats does not match, or the output cannot be written.
+/// Runs the verb. Repairs surfaces and prints every repair. Fails when the input is refused, the pair of formats does
+/// not match, or the output cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let from = &arguments.from;
     check_apart(
@@ -133,10 +131,8 @@ impl LookArguments {
         self.color.is_some() || self.mesh.is_some() || self.spheres
     }
 
-    /// Refuses options that the output format lacks, and incomplete ones, before any file is read.
-    ///
-    /// # Errors
-    /// Names the option.
+    /// Refuses options that the output format lacks, and incomplete ones, before any file is read. The error names the
+    /// option.
     fn check(&self, to: &Path) -> Result<(), Failure> {
         for (is_set, option, extensions) in [
             (self.color.is_some(), "--color", &["vtp", "glb"][..]),
@@ -155,10 +151,8 @@ impl LookArguments {
         }
     }
 
-    /// Reads a medial mesh and its display options.
-    ///
-    /// # Errors
-    /// When it or the surface is refused, or they cannot belong together.
+    /// Reads a medial mesh and its display options. Fails when it or the surface is refused, or they cannot belong
+    /// together.
     fn read(&self, from: &Path, options: AxisOptions) -> Result<(LoadedMa, Look), Failure> {
         if let Some(surface) = &self.mesh {
             let (_, shape) = shape_of(surface, ShapeOptions::default())?;

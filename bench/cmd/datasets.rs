@@ -51,10 +51,7 @@ struct Make {
     seed: u64,
 }
 
-/// Runs the verb.
-///
-/// # Errors
-/// When nothing has the name, or a file cannot be read or written.
+/// Runs the verb. Fails when nothing has the name, or a file cannot be read or written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     match &arguments.action {
         Action::List => list_all(global),
@@ -100,10 +97,7 @@ struct Fetch {
     timeout: f64,
 }
 
-/// Fetches the missing meshes.
-///
-/// # Errors
-/// When a word is unknown, Python is not installed, or the script refuses its input.
+/// Fetches the missing meshes. Fails when a word is unknown, Python is not installed, or the script refuses its input.
 fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     let library = Library::here()?;
     for word in &arguments.names {
@@ -156,10 +150,7 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     Ok(exit)
 }
 
-/// Lists built-in shapes and published meshes.
-///
-/// # Errors
-/// When the library cannot be read.
+/// Lists built-in shapes and published meshes. Fails when the library cannot be read.
 fn list_all(global: &Global) -> Result<Exit, Failure> {
     let shapes = medial_datasets::catalogue();
     let library = Library::here()?;

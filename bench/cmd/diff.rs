@@ -11,8 +11,8 @@ use medial_run::item::Item;
 use medial_run::record::Record;
 
 use crate::args::{Global, share};
+use crate::exec::Supervisor;
 use crate::exec::queue::{Build, Contender, run_items};
-use crate::exec::{RunError, Supervisor};
 use crate::exit::{Exit, Failure};
 use crate::files;
 use crate::interrupt;
@@ -53,11 +53,8 @@ pub struct Arguments {
     seconds: f64,
 }
 
-/// Runs the verb.
-///
-/// # Errors
-/// When the records of a side cannot be read, or with `--run` a program is not a build of this one, the study is wrong,
-/// or results cannot be written.
+/// Runs the verb. Fails when the records of a side cannot be read, or with `--run` a program is not a build of this
+/// one, the study is wrong, or results cannot be written.
 pub fn run(
     arguments: &Arguments,
     global: &Global,
@@ -155,7 +152,7 @@ fn alternate(
             .any(|side| !side.store.missing(&side.supervisors[0].own(item), false).is_empty())
     });
     let ended = run_items(&left, &mut sides, global.progress(), &mut |_| ());
-    if interrupt::stop_listening() || matches!(ended, Err(RunError::Interrupted)) {
+    if interrupt::stop_listening() {
         print_error(
             "interrupted: recorded the finished results; run the same command again to resume",
         );

@@ -56,10 +56,8 @@ pub struct Arguments {
     measure: MeasureArguments,
 }
 
-/// Runs the verb. With several files, a file that cannot be read is reported and the others are evaluated.
-///
-/// # Errors
-/// When the surface or the only medial mesh is refused.
+/// Runs the verb. With several files, a file that cannot be read is reported and the others are evaluated. Fails when
+/// the surface or the only medial mesh is refused.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let edition = arguments.against.as_deref().map(Edition::open).transpose()?;
     let options = match &edition {

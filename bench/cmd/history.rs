@@ -31,10 +31,7 @@ pub struct Arguments {
     least_step: f64,
 }
 
-/// Runs the verb.
-///
-/// # Errors
-/// When the results or the history cannot be read, or the run cannot be added.
+/// Runs the verb. Fails when the results or the history cannot be read, or the run cannot be added.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let Arguments { folder, least_step, .. } = arguments;
     let (added, mut warnings) = add(arguments)?;

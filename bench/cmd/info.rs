@@ -16,10 +16,7 @@ pub struct Arguments {
     mesh: MeshArgument,
 }
 
-/// Runs the verb. A refused mesh is described as far as possible, with exit code 1.
-///
-/// # Errors
-/// When the file cannot be read.
+/// Runs the verb. A refused mesh is described as far as possible, with exit code 1. Fails when the file cannot be read.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh)?;
     let (report, refusal) = match source.path() {

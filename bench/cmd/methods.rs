@@ -15,10 +15,7 @@ pub struct Arguments {
     id: Option<String>,
 }
 
-/// Runs the verb.
-///
-/// # Errors
-/// When no method has the id.
+/// Runs the verb. Fails when no method has the id.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let entries: Vec<&Entry> = match &arguments.id {
         Some(id) => vec![method(registry, id)?],

@@ -59,10 +59,8 @@ enum Method {
 /// A result farther from the mesh than this, in its diagonals, is probably of another surface.
 const ASTRAY: f64 = 0.5;
 
-/// Runs the verb.
-///
-/// # Errors
-/// When an input is refused, the power crust has no mesh, the tolerance is too fine, or the output cannot be written.
+/// Runs the verb. Fails when an input is refused, the power crust has no mesh, the tolerance is too fine, or the output
+/// cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let Arguments { axis, output, method, mesh: of, .. } = arguments;
     check_extension(output, &SURFACES)?;

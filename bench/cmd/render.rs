@@ -87,10 +87,7 @@ fn colour() -> impl TypedValueParser<Value = ColourBy> {
     ])
 }
 
-/// Runs the verb.
-///
-/// # Errors
-/// When an input is refused, an option is invalid, or the picture cannot be written.
+/// Runs the verb. Fails when an input is refused, an option is invalid, or the picture cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     // All options are checked before the first file is read.
     let Arguments { output, show, color, camera, up, zoom, size, background, .. } = arguments;

@@ -39,10 +39,8 @@ enum Keep {
     All,
 }
 
-/// Runs the verb. Nothing is written unless the result bounds a solid.
-///
-/// # Errors
-/// When the surface cannot be read, is still refused after the repairs, or cannot be written.
+/// Runs the verb. Nothing is written unless the result bounds a solid. Fails when the surface cannot be read, is still
+/// refused after the repairs, or cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     check_folder(&arguments.output)?;
     check_apart(Some(&arguments.output), [arguments.input.as_path()])?;

@@ -46,10 +46,8 @@ pub struct Arguments {
     site: Option<PathBuf>,
 }
 
-/// Runs the verb.
-///
-/// # Errors
-/// When the folder has no readable records, another process adds to it, or the report cannot be written.
+/// Runs the verb. Fails when the folder has no readable records, another process adds to it, or the report cannot be
+/// written.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let (dir, notes) = match (&arguments.dirs[..], &arguments.out) {
         ([dir], None) => (dir, Vec::new()),

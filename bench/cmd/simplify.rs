@@ -61,10 +61,7 @@ pub struct Arguments {
     measure: MeasureArguments,
 }
 
-/// Runs the verb.
-///
-/// # Errors
-/// When the input is refused, the level is not met at all, or the output cannot be written.
+/// Runs the verb. Fails when the input is refused, the level is not met at all, or the output cannot be written.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let entry = arguments.entry(registry)?;
     let options = arguments.substrate.shape_options()?;

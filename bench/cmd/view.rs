@@ -32,10 +32,7 @@ pub struct Arguments {
     open: bool,
 }
 
-/// Runs the verb.
-///
-/// # Errors
-/// When an input is refused or empty, the page cannot be written, or there is no browser.
+/// Runs the verb. Fails when an input is refused or empty, the page cannot be written, or there is no browser.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let Arguments { axes: paths, output, .. } = arguments;
     check_extension(output, &["html"])?;

@@ -31,31 +31,8 @@ use medial_run::timed::Fault;
 use crate::check::Outcome;
 use crate::exec::protocol::{CheckItem, Event, PROTOCOL, Request};
 use crate::exec::worker::{Worker, WorkerOptions};
+use crate::exit::{Exit, Failure};
 use crate::process_tree::signal_name;
-use crate::store::{AGAIN, StoreError};
-
-/// The reason for which a list of items stops.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// The user interrupted the run.
-    #[error("interrupted")]
-    Interrupted,
-    /// A worker cannot be started.
-    #[error("worker process: cannot be started ({0})")]
-    Start(io::Error),
-    /// The program of another build does not serve as a worker.
-    #[error("{}: not a worker of this build (found {found}, expected protocol {PROTOCOL}); \
-             name a build of medial of the same protocol", program.display())]
-    Foreign {
-        /// The program.
-        program: PathBuf,
-        /// Its first message, or its end.
-        found: String,
-    },
-    /// A record cannot be written.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-}
 
 /// Runs items one after another, in a worker that it replaces when an item has broken it.
 pub struct Supervisor<'a> {
@@ -73,8 +50,6 @@ pub struct Supervisor<'a> {
     /// An input that ended its worker.
     // Its other items are not tried: they would end the next worker at the same place.
     lost: Option<(SceneSpec, Fault)>,
-    /// Commands that run items again whose worker ended.
-    again: Vec<String>,
 }
 
 /// The times of a repetition of a level, and a hash of its result.
@@ -107,7 +82,6 @@ impl<'a> Supervisor<'a> {
             worker: None,
             input: None,
             lost: None,
-            again: Vec::new(),
         }
     }
 
@@ -133,12 +107,10 @@ impl<'a> Supervisor<'a> {
 
     /// Runs an item: a record for each level, in the order of the levels.
     ///
-    /// When a worker ends, the records that it reported stay. Levels that it finished but did not report
-    /// run again. The level that ended it gets the reason, and later levels are skipped.
-    ///
-    /// # Errors
-    /// When the user interrupts, or no worker can be started.
-    pub fn run(&mut self, item: &Item) -> Result<Vec<Record>, RunError> {
+    /// When a worker ends, the records that it reported stay. Levels that it finished but did not report run again. The
+    /// level that ended it gets the reason, and later levels are skipped. Fails when the user interrupts, or no worker
+    /// can be started.
+    pub fn run(&mut self, item: &Item) -> Result<Vec<Record>, Failure> {
         let (item, mut records): (_, Vec<Record>) = (&self.own(item), Vec::new());
         // A stack: groups that are split off run before later ones, from fine to coarse.
         let mut groups = vec![item.levels.clone()];
@@ -195,14 +167,11 @@ impl<'a> Supervisor<'a> {
     }
 
     /// Times all levels of an item that have a result once more.
-    ///
-    /// # Errors
-    /// As [`Supervisor::run`].
     pub fn again(
         &mut self,
         item: &Item,
         first: &[Record],
-    ) -> Result<Result<Vec<Repeated>, Fault>, RunError> {
+    ) -> Result<Result<Vec<Repeated>, Fault>, Failure> {
         let mut item = item.clone();
         // The first run has decided which levels fit the budget.
         item.limits.budget = None;
@@ -224,10 +193,7 @@ impl<'a> Supervisor<'a> {
     }
 
     /// The reason for which a method rejects its parameters, found by preparing it on a very small shape.
-    ///
-    /// # Errors
-    /// As [`Supervisor::run`].
-    pub fn refused_params(&mut self, item: &Item) -> Result<Option<String>, RunError> {
+    pub fn refused_params(&mut self, item: &Item) -> Result<Option<String>, Failure> {
         let request = Request::Probe { item: item.clone() };
         let mut refused = None;
         // A method that ends its worker does not reject its parameters.
@@ -240,10 +206,7 @@ impl<'a> Supervisor<'a> {
     }
 
     /// Runs one case of the conformance corpus on a method. A method that ends its worker fails.
-    ///
-    /// # Errors
-    /// As [`Supervisor::run`].
-    pub fn check(&mut self, item: &CheckItem) -> Result<Outcome, RunError> {
+    pub fn check(&mut self, item: &CheckItem) -> Result<Outcome, Failure> {
         let request = Request::Check(item.clone());
         let (mut outcome, mut at) = (None, String::new());
         let attempt = self.converse(&request, &mut |event| match event {
@@ -273,7 +236,7 @@ impl<'a> Supervisor<'a> {
         record
     }
 
-    fn attempt(&mut self, item: &Item) -> Result<(Attempt, Vec<Record>), RunError> {
+    fn attempt(&mut self, item: &Item) -> Result<(Attempt, Vec<Record>), Failure> {
         if let Some((scene, fault)) = &self.lost
             && *scene == item.scene
         {
@@ -299,7 +262,7 @@ impl<'a> Supervisor<'a> {
         &mut self,
         request: &Request,
         each: &mut dyn FnMut(Event),
-    ) -> Result<Attempt, RunError> {
+    ) -> Result<Attempt, Failure> {
         let (item, (_, limits)) = (request.item(), request.terms());
         let mut worker = self.worker_for(request)?;
         let mut stage = Stage::Loading;
@@ -308,25 +271,25 @@ impl<'a> Supervisor<'a> {
             // It ended while it was idle: try a new one.
             drop(worker);
             worker = self.worker_for(request)?;
-            worker.send(request).map_err(RunError::Start)?;
+            worker.send(request).map_err(not_started)?;
         }
         let (mut since, mut looked) = (Instant::now(), Instant::now());
         loop {
             if self.interrupted.load(Ordering::Relaxed) {
                 worker.end();
-                return Err(RunError::Interrupted);
+                return Err(Failure { code: Exit::Interrupted, message: "interrupted".to_owned() });
             }
             // Also between events: a worker that sends events without end must not escape the limit.
             if since.elapsed() > limits.time() {
                 worker.end();
-                return Ok(self.ended(request, stage, timed_out(stage, &limits)));
+                return Ok(Attempt::Ended(stage, timed_out(stage, &limits)));
             }
             // The memory limit of the worker does not cover the programs that it started.
             if looked.elapsed() >= LOOK_AGAIN {
                 looked = Instant::now();
                 if worker.resident_bytes() > limits.bytes {
                     worker.end();
-                    return Ok(self.ended(request, stage, out_of_memory(stage, &limits)));
+                    return Ok(Attempt::Ended(stage, out_of_memory(stage, &limits)));
                 }
             }
             match worker.listen(LOOK_AGAIN) {
@@ -379,7 +342,7 @@ impl<'a> Supervisor<'a> {
                     // A refused allocation that the worker survived did not end it.
                     let memory_refused = memory_refused && !status.is_some_and(|s| s.success());
                     let fault = ended(stage, status, &stderr, memory_refused, &limits);
-                    return Ok(self.ended(request, stage, fault));
+                    return Ok(Attempt::Ended(stage, fault));
                 }
                 Err(RecvTimeoutError::Timeout) => {}
             }
@@ -387,59 +350,32 @@ impl<'a> Supervisor<'a> {
     }
 
     /// The error of a program that does not serve as a worker.
-    fn foreign(&self, found: String) -> RunError {
+    fn foreign(&self, found: String) -> Failure {
         // The running program as its own worker is of this build.
-        let program = self.program.clone().unwrap_or_else(|| PathBuf::from("medial"));
-        RunError::Foreign { program, found }
-    }
-
-    /// The end of a worker. The request stays in a file, with a command that runs it again.
-    fn ended(&mut self, request: &Request, stage: Stage, fault: Fault) -> Attempt {
-        if let (Some(axes), Some(item)) = (&self.axes, request.item()) {
-            let key = item.levels.first().map_or_else(String::new, |&level| item.key(level));
-            let folder = axes.with_file_name(AGAIN);
-            let file = folder.join(format!("{}.json", &key[..key.len().min(12)]));
-            let text = serde_json::to_string(request).expect("plain data") + "\n";
-            let written = std::fs::create_dir_all(&folder).is_ok()
-                && medial::write_atomically(&file, |out| out.write_all(text.as_bytes())).is_ok();
-            // Without the file the record still has the reason.
-            if written {
-                let program = self.program.as_deref().unwrap_or(Path::new("medial"));
-                let mut words = vec![program.display().to_string(), "worker".to_owned()];
-                words.extend(self.options(request).arguments());
-                self.again.push(format!(
-                    "{}, {}: run this item again by `{} < '{}'`",
-                    item.scene.mesh,
-                    item.method.label(),
-                    words.join(" "),
-                    file.display()
-                ));
-            }
-        }
-        Attempt::Ended(stage, fault)
-    }
-
-    /// The commands that run items again whose worker ended, since the last call.
-    pub fn take_again(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.again)
+        let program = self.program.as_deref().unwrap_or(Path::new("medial"));
+        let why = format!(
+            "(found {found}, expected protocol {PROTOCOL}); name a build of medial of the same protocol"
+        );
+        Failure::at(program, format!("not a worker of this build {why}"))
     }
 
     /// The present worker if it fits the request, else a new one.
-    fn worker_for(&mut self, request: &Request) -> Result<Worker, RunError> {
+    fn worker_for(&mut self, request: &Request) -> Result<Worker, Failure> {
         // The size of the pool and the limit of memory cannot be changed in a running process.
-        let options = self.options(request);
-        match self.worker.take() {
-            Some(worker) if worker.options == options => Ok(worker),
-            _ => Worker::start(options).map_err(RunError::Start),
-        }
-    }
-
-    /// How the worker of a request is started.
-    fn options(&self, request: &Request) -> WorkerOptions {
         let (threads, limits) = request.terms();
         let (program, plugins) = (self.program.clone(), self.plugins.clone());
-        WorkerOptions { program, threads, bytes: limits.bytes, plugins }
+        let options = WorkerOptions { program, threads, bytes: limits.bytes, plugins };
+        match self.worker.take() {
+            Some(worker) if worker.options == options => Ok(worker),
+            _ => Worker::start(options).map_err(not_started),
+        }
     }
+}
+
+/// No worker, no result: not the fault of an input.
+fn not_started(error: io::Error) -> Failure {
+    let message = format!("worker process: cannot be started ({error})");
+    Failure { code: Exit::NothingMeasured, message }
 }
 
 /// Adds a repetition to the records of an item. A fault of a repetition becomes the status of the

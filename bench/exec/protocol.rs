@@ -116,10 +116,7 @@ pub enum Event {
     Finished,
 }
 
-/// Writes an event to standard output, where the supervisor reads.
-///
-/// # Errors
-/// When the supervisor has closed the pipe.
+/// Writes an event to standard output, where the supervisor reads. Fails when the supervisor has closed the pipe.
 pub fn send(event: &Event) -> io::Result<()> {
     let text = serde_json::to_string(event)?;
     // One write, and a line break first: a method may have printed an unfinished line.

@@ -19,10 +19,11 @@ use medial_run::outcome::median;
 use medial_run::record::Provenance;
 use medial_run::record::{Record, Status};
 
-use crate::exec::{RunError, Supervisor, merge};
+use crate::exec::{Supervisor, merge};
+use crate::exit::Failure;
 use crate::progress::{Progress, Verbosity};
 use crate::provenance::provenance;
-use crate::store::{Store, StoreError};
+use crate::store::Store;
 
 /// The items with the levels that a store lacks, and the number of levels that it has.
 pub fn missing(items: &[Item], store: &Store, retry_failed: bool) -> (Vec<Item>, usize) {
@@ -38,14 +39,12 @@ pub fn missing(items: &[Item], store: &Store, retry_failed: bool) -> (Vec<Item>,
     (left, found)
 }
 
-/// The reason for which a method rejects its parameters, found before any run by preparing on a very small shape.
-///
-/// # Errors
-/// When the user interrupts, or no worker can be started.
+/// The reason for which a method rejects its parameters, found before any run by preparing on a very small shape. Fails
+/// when the user interrupts, or no worker can be started.
 pub fn refused_params(
     items: &[Item],
     supervisor: &mut Supervisor<'_>,
-) -> Result<Option<String>, RunError> {
+) -> Result<Option<String>, Failure> {
     let mut seen: Vec<&MethodSpec> = Vec::new();
     // Defaults are the methods' own and need no probe.
     for item in items.iter().filter(|item| !item.method.params.0.is_empty()) {
@@ -64,16 +63,14 @@ pub fn refused_params(
 /// the last repetition.
 ///
 /// As many items run at the same time as each side has supervisors. `on_recorded` gets the remaining items after each
-/// recorded one. With one supervisor nothing else runs while an item is timed.
-///
-/// # Errors
-/// When the user interrupts, no worker can be started, or records cannot be written.
+/// recorded one. With one supervisor nothing else runs while an item is timed. Fails when the user interrupts, no
+/// worker can be started, or records cannot be written.
 pub fn run_items(
     items: &[Item],
     sides: &mut [Contender<'_>],
     verbosity: Verbosity,
     on_recorded: &mut (dyn FnMut(&[&Item]) + Send),
-) -> Result<(), RunError> {
+) -> Result<(), Failure> {
     let (mut lanes, mut stores): (Vec<Lane<'_, '_>>, _) = (Vec::new(), Vec::new());
     for Contender { supervisors, store } in sides {
         stores.push(store);
@@ -119,12 +116,12 @@ fn lock<'m, 'd>(desk: &'m Mutex<Desk<'d>>) -> MutexGuard<'m, Desk<'d>> {
 }
 
 /// Runs batches until there are none.
-fn work(lane: &mut Lane<'_, '_>, desk: &Mutex<Desk<'_>>) -> Result<(), RunError> {
+fn work(lane: &mut Lane<'_, '_>, desk: &Mutex<Desk<'_>>) -> Result<(), Failure> {
     loop {
         let Some((number, batch)) = lock(desk).batches.pop_front() else { return Ok(()) };
         let ended = run_batch(number, batch, lane, desk);
         let mut desk = lock(desk);
-        if let Err(error) = ended.and_then(|records| Ok(desk.record(batch, records)?)) {
+        if let Err(error) = ended.and_then(|records| desk.record(batch, records)) {
             // The other lanes end after their present items.
             desk.batches.clear();
             return Err(error);
@@ -138,7 +135,7 @@ fn run_batch(
     batch: &[Item],
     lane: &mut Lane<'_, '_>,
     desk: &Mutex<Desk<'_>>,
-) -> Result<Vec<Vec<Vec<Record>>>, RunError> {
+) -> Result<Vec<Vec<Vec<Record>>>, Failure> {
     let mut all = vec![vec![vec![]; lane.len()]; batch.len()];
     for turn in 1..=batch[0].repeat.max(1) {
         if turn > 1 && lane.len() > 1 {
@@ -154,9 +151,7 @@ fn run_batch(
                 let records = &mut by_side[side];
                 if turn == 1 {
                     *records = lane[side].run(item)?;
-                    let remarks = reasons(records);
-                    let again = lane[side].take_again();
-                    remarks.iter().chain(&again).for_each(|it| lock(desk).progress.remark(it));
+                    reasons(records).iter().for_each(|why| lock(desk).progress.remark(why));
                 } else if records.iter().any(|record| record.status.has_result()) {
                     let again = lane[side].again(item, records)?;
                     merge(records, turn, again);
@@ -170,7 +165,7 @@ fn run_batch(
 
 impl Desk<'_> {
     /// Records a batch with the seconds of the median repetition.
-    fn record(&mut self, batch: &[Item], all: Vec<Vec<Vec<Record>>>) -> Result<(), StoreError> {
+    fn record(&mut self, batch: &[Item], all: Vec<Vec<Vec<Record>>>) -> Result<(), Failure> {
         for (item, sides) in batch.iter().zip(all) {
             for (store, mut records) in self.stores.iter_mut().zip(sides) {
                 for record in &mut records {
@@ -205,10 +200,7 @@ pub struct Build {
 }
 
 impl Build {
-    /// The build in a file.
-    ///
-    /// # Errors
-    /// When it cannot be read or started, or is another program.
+    /// The build in a file. Fails when it cannot be read or started, or is another program.
     pub fn of(program: &Path) -> Result<Self, String> {
         let failed = |error: io::Error| format!("{}: {error}", program.display());
         // A worker is started from any folder.

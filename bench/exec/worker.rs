@@ -30,18 +30,6 @@ pub struct WorkerOptions {
     pub plugins: Vec<PathBuf>,
 }
 
-impl WorkerOptions {
-    /// The words after the verb.
-    pub fn arguments(&self) -> Vec<String> {
-        let (threads, bytes) = (self.threads.to_string(), self.bytes.to_string());
-        let mut words = ["--threads", &threads, "--bytes", &bytes].map(str::to_owned).to_vec();
-        // Study files and arguments have UTF-8 paths.
-        let files = self.plugins.iter().map(|file| file.display().to_string());
-        words.extend(files.flat_map(|file| ["--plugins".to_owned(), file]));
-        words
-    }
-}
-
 /// A running worker.
 pub struct Worker {
     child: Child,
@@ -59,15 +47,14 @@ pub struct Worker {
 
 impl Worker {
     /// Starts a worker: the running program, with the verb `worker`.
-    ///
-    /// # Errors
-    /// When the process cannot be started.
     pub fn start(options: WorkerOptions) -> io::Result<Self> {
         let mut command = match &options.program {
             Some(program) => host::named(Command::new(program)),
             None => Host::here()?.command(),
         };
-        command.arg("worker").args(options.arguments());
+        command.arg("worker").args(["--threads", &options.threads.to_string()]);
+        command.args(["--bytes", &options.bytes.to_string()]);
+        options.plugins.iter().for_each(|file| _ = command.arg("--plugins").arg(file));
         // One folder for each worker: when it is killed, the files of its programs go with it.
         let scratch = tempfile::Builder::new().prefix("medial-").tempdir()?;
         command.env(SCRATCH, scratch.path());
@@ -100,9 +87,6 @@ impl Worker {
     }
 
     /// Sends a request.
-    ///
-    /// # Errors
-    /// When the worker no longer reads.
     pub fn send(&mut self, request: &Request) -> io::Result<()> {
         let requests = self.requests.as_mut().ok_or(io::ErrorKind::BrokenPipe)?;
         let mut line = serde_json::to_vec(request)?;
@@ -111,10 +95,8 @@ impl Worker {
         requests.flush()
     }
 
-    /// The next event, if it comes within `patience`.
-    ///
-    /// # Errors
-    /// [`RecvTimeoutError::Disconnected`] when the process has ended, or closed its output.
+    /// The next event, if it comes within `patience`. [`RecvTimeoutError::Disconnected`] when the process has
+    /// ended, or closed its output.
     pub fn listen(&self, patience: Duration) -> Result<Event, RecvTimeoutError> {
         self.events.recv_timeout(patience)
     }

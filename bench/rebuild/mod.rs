@@ -47,10 +47,8 @@ pub struct Rebuilt {
     pub undrawn: Vec<String>,
 }
 
-/// Rebuilds the report of a folder from its files.
-///
-/// # Errors
-/// When the folder has no readable record, or the report cannot be written.
+/// Rebuilds the report of a folder from its files. Fails when the folder has no readable record, or the report cannot
+/// be written.
 pub fn rebuild(dir: &Path, registry: &Registry) -> Result<Rebuilt, Failure> {
     let (records, warnings) = some_records(dir)?;
     let header = header(dir, &records, registry, &warnings);
@@ -71,10 +69,8 @@ fn some_records(dir: &Path) -> Result<(Vec<Record>, Vec<String>), Failure> {
     Ok((records, warnings))
 }
 
-/// Writes the static site of a store, which stays unchanged, into a folder.
-///
-/// # Errors
-/// When the store has no readable record, or the site cannot be written.
+/// Writes the static site of a store, which stays unchanged, into a folder. Fails when the store has no readable record,
+/// or the site cannot be written.
 pub fn write_site_of(dir: &Path, site: &Path, registry: &Registry) -> Result<Rebuilt, Failure> {
     let (records, warnings) = some_records(dir)?;
     let header = header(dir, &records, registry, &warnings);
@@ -115,10 +111,7 @@ pub struct RunReport<'a> {
 
 impl RunReport<'_> {
     /// Writes the report, marked while the run continues, with new pictures if `draws`. Without new records the page
-    /// stays unchanged.
-    ///
-    /// # Errors
-    /// When the records cannot be read, or the report cannot be written.
+    /// stays unchanged. Fails when the records cannot be read, or the report cannot be written.
     pub fn write(&self, running: Option<Running>, draws: bool) -> Result<Rebuilt, Failure> {
         let (records, warnings) = records(self.dir)?;
         let is_marked = read_header(self.dir).is_ok_and(|header| header.running.is_some());
@@ -171,7 +164,7 @@ fn arranged(
         Ok(edition) => Some(edition?.beside(&study, &records, registry)),
         // The own results do not depend on it.
         Err(error) => {
-            header.notes.push(error.to_string());
+            header.notes.push(error.message);
             None
         }
     });
@@ -198,17 +191,11 @@ fn positions(items: &[Item]) -> HashMap<String, usize> {
 }
 
 /// Writes the requested study next to its results.
-///
-/// # Errors
-/// When it cannot be written.
 pub fn write_study(dir: &Path, study: &Study) -> Result<(), Failure> {
     files::write(&dir.join(STUDY), study.to_text()?.as_bytes())
 }
 
-/// The records of a store or of a file, and warnings about lines without a record.
-///
-/// # Errors
-/// When the file cannot be read.
+/// The records of a store or of a file, and warnings about lines without a record. Fails when the file cannot be read.
 pub fn records(path: &Path) -> Result<(Vec<Record>, Vec<String>), Failure> {
     let file = if path.is_dir() { path.join(RESULTS) } else { path.to_owned() };
     let journaled = read_records(&file).map_err(Failure::input)?;

@@ -22,6 +22,7 @@ use medial_run::text::significant;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use crate::exit::Failure;
 use crate::study::registry::{INITIAL, Registry};
 use crate::study::{Study, parse_toml};
 
@@ -76,77 +77,6 @@ pub struct EditionMesh {
     pub sha256: String,
 }
 
-/// The reason for which an edition cannot be compared with a study.
-#[derive(Debug, thiserror::Error)]
-pub enum EditionError {
-    /// Neither a name of an edition nor a folder.
-    #[error("--against {name}: unknown edition{meant} (expected a folder or one of: {known})")]
-    Unknown {
-        /// The name.
-        name: String,
-        /// A similar name, as a question.
-        meant: String,
-        /// The names of all editions.
-        known: String,
-    },
-    /// A file cannot be read, or is not what its name says.
-    #[error("{}: {message}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// The problem.
-        message: String,
-    },
-    /// The records are not those that the description names.
-    #[error(
-        "edition {name}: the records have changed (SHA-256 {found}, expected {expected}); restore {RECORDS}"
-    )]
-    Changed {
-        /// The edition.
-        name: String,
-        /// Hash of the records.
-        found: String,
-        /// Hash in the description.
-        expected: String,
-    },
-    /// Its numbers have later definitions.
-    #[error(
-        "edition {name}: the numbers have other definitions (found version {edition}, expected at most \
-         {DEFINITIONS}); use a later build of medial or omit --against"
-    )]
-    Definitions {
-        /// The edition.
-        name: String,
-        /// Version of its metrics.
-        edition: u32,
-    },
-    /// The study measures in another way.
-    #[error(
-        "--{option} {found}: edition {name} was measured with {expected}, so the results do not compare; \
-         omit --{option} or --against"
-    )]
-    Settings {
-        /// The edition.
-        name: String,
-        /// The option.
-        option: &'static str,
-        /// Its value in the study.
-        found: String,
-        /// Its value in the edition.
-        expected: String,
-    },
-    /// No mesh in common.
-    #[error(
-        "--against {name}: no mesh of this comparison is in the edition (expected one of: {known})"
-    )]
-    NoMesh {
-        /// The edition.
-        name: String,
-        /// Its meshes.
-        known: String,
-    },
-}
-
 /// An edition whose records are those of its description.
 #[derive(Debug)]
 pub struct Edition {
@@ -177,7 +107,7 @@ impl Edition {
     ///
     /// # Errors
     /// As [`Self::open`].
-    pub fn of(study: &Study) -> Result<Option<Self>, EditionError> {
+    pub fn of(study: &Study) -> Result<Option<Self>, Failure> {
         let is_known = |name: &Path| EDITIONS.iter().any(|known| Path::new(known.name) == name);
         let name = study.against.as_ref();
         let name =
@@ -189,10 +119,10 @@ impl Edition {
     ///
     /// # Errors
     /// Unless it is known, unaltered, and measured by no later definitions than those of this program.
-    pub fn open(name: &Path) -> Result<Self, EditionError> {
+    pub fn open(name: &Path) -> Result<Self, Failure> {
         let embedded = EDITIONS.iter().find(|edition| Path::new(edition.name) == name);
         let file = |of: &str| embedded.map_or_else(|| name.join(of), |_| PathBuf::from(of));
-        let failed = |of: &str, message: String| EditionError::File { path: file(of), message };
+        let failed = |of: &str, message: String| Failure::at(&file(of), message);
         let (text, packed) = match embedded {
             Some(Embedded { description, records, .. }) => {
                 ((*description).to_owned(), records.to_vec())
@@ -201,7 +131,10 @@ impl Edition {
                 let known: Vec<&str> = EDITIONS.iter().map(|edition| edition.name).collect();
                 let name = name.display().to_string();
                 let meant = did_you_mean(&name, known.iter().copied());
-                return Err(EditionError::Unknown { name, meant, known: known.join(", ") });
+                let known = known.join(", ");
+                return Err(Failure::usage(format!(
+                    "--against {name}: unknown edition{meant} (expected a folder or one of: {known})"
+                )));
             }
             None => {
                 let read = |of: &str| {
@@ -218,10 +151,16 @@ impl Edition {
         let (name, found) = (description.name.clone(), hex_digest(&packed));
         if found != description.sha256 {
             let expected = description.sha256;
-            return Err(EditionError::Changed { name, found, expected });
+            return Err(Failure::input(format!(
+                "edition {name}: the records have changed (SHA-256 {found}, expected {expected}); restore {RECORDS}"
+            )));
         }
         if description.metrics > DEFINITIONS {
-            return Err(EditionError::Definitions { name, edition: description.metrics });
+            return Err(Failure::input(format!(
+                "edition {name}: the numbers have other definitions (found version {}, expected at most {DEFINITIONS}); use \
+                 a later build of medial or omit --against",
+                description.metrics
+            )));
         }
         let unpacked = unpack(&packed).map_err(|error| failed(RECORDS, error.to_string()))?;
         if let Some(line) = unpacked.bad_lines.first() {
@@ -246,7 +185,7 @@ impl Edition {
     ///
     /// # Errors
     /// For the first option that differs, and without a common mesh.
-    pub fn check(&self, study: &Study, items: &[Item]) -> Result<(), EditionError> {
+    pub fn check(&self, study: &Study, items: &[Item]) -> Result<(), Failure> {
         let Description { samples, volume_depth, seed, sampling, dual, .. } = &self.description;
         let settings = [
             ("spheres-alone", study.spheres_alone.to_string(), false.to_string()),
@@ -256,21 +195,25 @@ impl Edition {
             ("sampling", study.sampling.to_string(), sampling.to_string()),
             ("dual", study.dual.to_string(), dual.to_string()),
         ];
-        let name = self.description.name.clone();
+        let name = &self.description.name;
         for (option, found, expected) in settings {
             if found != expected {
-                return Err(EditionError::Settings { name, option, found, expected });
+                return Err(Failure::usage(format!(
+                    "--{option} {found}: edition {name} was measured with {expected}, so the results do not compare; omit \
+                     --{option} or --against"
+                )));
             }
         }
         let meshes = &self.description.mesh;
         let hashes = items.iter().filter_map(|item| item.scene.hash.as_ref());
-        match hashes.into_iter().any(|hash| meshes.iter().any(|mesh| mesh.sha256 == *hash)) {
-            true => Ok(()),
-            false => {
-                let known: Vec<&str> = meshes.iter().map(|mesh| mesh.source.as_str()).collect();
-                Err(EditionError::NoMesh { name, known: known.join(", ") })
-            }
+        if hashes.into_iter().any(|hash| meshes.iter().any(|mesh| mesh.sha256 == *hash)) {
+            return Ok(());
         }
+        let known: Vec<&str> = meshes.iter().map(|mesh| mesh.source.as_str()).collect();
+        Err(Failure::usage(format!(
+            "--against {name}: no mesh of this comparison is in the edition (expected one of: {})",
+            known.join(", ")
+        )))
     }
 
     /// The methods whose version in this program is another one.

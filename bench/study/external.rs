@@ -26,7 +26,8 @@ use medial_run::record::{COUNT_TOLERANCE, OwnSeconds, Provenance};
 use medial_run::scene::SceneSpec;
 use serde::{Deserialize, Serialize};
 
-use crate::study::{Study, StudyError, parse_toml};
+use crate::exit::Failure;
+use crate::study::{Study, parse_toml};
 
 /// An external result with its name in tables.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -155,8 +156,8 @@ fn check_inside(folder: &Path, file: &Path) -> Result<(), String> {
 }
 
 impl ExternalResult {
-    fn refused(&self, why: impl Display) -> StudyError {
-        StudyError::Value(format!("given `{}`: {why}", self.name))
+    fn refused(&self, why: impl Display) -> Failure {
+        Failure::usage(format!("given `{}`: {why}", self.name))
     }
 
     /// The files of a folder with the names of their meshes, its claims, and the files without a mesh in the study.
@@ -337,11 +338,8 @@ impl Study {
     /// The external results with their meshes, among the names of all meshes.
     ///
     /// # Errors
-    /// [`StudyError::Value`] for a file that cannot be read or belongs to no mesh, and for two of one name.
-    pub(crate) fn external_files(
-        &self,
-        meshes: &[String],
-    ) -> Result<Vec<ExternalFile>, StudyError> {
+    /// For a file that cannot be read or belongs to no mesh, and for two of one name.
+    pub(crate) fn external_files(&self, meshes: &[String]) -> Result<Vec<ExternalFile>, Failure> {
         let mut files: Vec<ExternalFile> = Vec::new();
         let mut all: Vec<(ExternalResult, Claims)> = Vec::new();
         for given in &self.given {
@@ -366,7 +364,7 @@ impl Study {
             if is_method || is_file {
                 let message =
                     format!("{mesh}, {spheres} spheres: two results named `{name}`; rename one");
-                return Err(StudyError::Value(message));
+                return Err(Failure::usage(message));
             }
             files.push(file);
         }
@@ -384,7 +382,7 @@ impl Study {
     ///
     /// # Errors
     /// When a folder is refused.
-    pub fn external_remarks(&self) -> Result<Vec<String>, StudyError> {
+    pub fn external_remarks(&self) -> Result<Vec<String>, Failure> {
         /// Names that a remark lists.
         const LISTED: usize = 10;
         let mut remarks = Vec::new();
@@ -414,7 +412,7 @@ impl Study {
         given: ExternalResult,
         claims: Claims,
         mesh: String,
-    ) -> Result<ExternalFile, StudyError> {
+    ) -> Result<ExternalFile, Failure> {
         let path = self.resolved(&given.file);
         // The worker that reads it has another working folder.
         let path = std::path::absolute(&path).unwrap_or(path);
@@ -456,7 +454,7 @@ impl Study {
     ///
     /// # Errors
     /// For a file that cannot be read.
-    pub fn external_counts(&self) -> Result<Vec<usize>, StudyError> {
+    pub fn external_counts(&self) -> Result<Vec<usize>, Failure> {
         let sources = self.sources()?;
         let files = self.external_files(&crate::study::unique_names(&sources))?;
         let mut counts: Vec<usize> = files.iter().map(|file| file.spheres).collect();
@@ -487,7 +485,7 @@ impl Study {
 }
 
 /// The mesh that a file belongs to.
-fn mesh_of(given: &ExternalResult, meshes: &[String]) -> Result<String, StudyError> {
+fn mesh_of(given: &ExternalResult, meshes: &[String]) -> Result<String, Failure> {
     let name = &given.name;
     let message = match (&given.mesh, meshes) {
         (Some(mesh), _) if meshes.contains(mesh) => return Ok(mesh.clone()),
@@ -503,7 +501,7 @@ fn mesh_of(given: &ExternalResult, meshes: &[String]) -> Result<String, StudyErr
             given.file.display()
         ),
     };
-    Err(StudyError::Value(message))
+    Err(Failure::usage(message))
 }
 
 #[cfg(test)]

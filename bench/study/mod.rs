@@ -29,6 +29,7 @@ use medial_run::text::did_you_mean;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use crate::exit::Failure;
 use crate::plugin::line_of;
 use crate::study::external::ExternalResult;
 use crate::study::registry::{Entry, INITIAL, Registry};
@@ -221,9 +222,9 @@ impl Study {
     /// Reads a study file. Relative paths in it start at its folder.
     ///
     /// # Errors
-    /// [`StudyError::File`], with the line where the text is at fault.
-    pub fn read(path: &Path) -> Result<Self, StudyError> {
-        let failed = |message: String| StudyError::File { path: path.to_owned(), message };
+    /// When it cannot be read or is no study, with the line where the text is at fault.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let failed = |message: String| Failure::at(path, message);
         let text = read_regular_text(path).map_err(|error| failed(error.to_string()))?;
         let mut study: Self = parse_toml(&text).map_err(failed)?;
         study.check_names().map_err(failed)?;
@@ -238,9 +239,9 @@ impl Study {
     /// The study as a file that [`Study::read`] reads.
     ///
     /// # Errors
-    /// [`StudyError::Value`] for a number that TOML cannot hold, or a path that is not UTF-8.
-    pub fn to_text(&self) -> Result<String, StudyError> {
-        toml::to_string(self).map_err(|error| StudyError::Value(format!("study: {error}")))
+    /// For a number that TOML cannot hold, or a path that is not UTF-8.
+    pub fn to_text(&self) -> Result<String, Failure> {
+        toml::to_string(self).map_err(|error| Failure::usage(format!("study: {error}")))
     }
 
     /// A path relative to the folder of the study; names of meshes stay.
@@ -275,8 +276,8 @@ impl Study {
     /// Refuses implausible values.
     ///
     /// # Errors
-    /// [`StudyError::Value`] for the first of them.
-    pub fn check(&self) -> Result<(), StudyError> {
+    /// For the first of them.
+    pub fn check(&self) -> Result<(), Failure> {
         let counts = self.methods.iter().filter_map(|method| method.spheres.as_ref());
         let mut levels = (self.methods.iter())
             .flat_map(|method| method.levels.iter().map(move |level| (&method.id, level)));
@@ -313,7 +314,7 @@ impl Study {
         } else {
             return Ok(());
         };
-        Err(StudyError::Value(fault))
+        Err(Failure::usage(fault))
     }
 }
 
@@ -326,37 +327,18 @@ impl StudyMethod {
     /// Reads `ID` or `ID:KEY=VALUE[:KEY=VALUE...]`.
     ///
     /// # Errors
-    /// [`StudyError::Value`] where a part has no `=`.
-    pub fn parse(text: &str) -> Result<Self, StudyError> {
+    /// Where a part has no `=`.
+    pub fn parse(text: &str) -> Result<Self, Failure> {
         let mut parts = text.split(':');
         let mut method = Self::of(parts.next().unwrap_or_default());
         for part in parts {
             let (key, value) = part.split_once('=').ok_or_else(|| {
-                StudyError::Value(format!("--methods {text}: expected ID:KEY=VALUE"))
+                Failure::usage(format!("--methods {text}: expected ID:KEY=VALUE"))
             })?;
             method.params.set(key, value);
         }
         Ok(method)
     }
-}
-
-/// An error in a study.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyError {
-    /// The file cannot be read, or is not a study.
-    #[error("{}: {message}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// The problem, with the line.
-        message: String,
-    },
-    /// A value is implausible.
-    #[error("{0}")]
-    Value(String),
-    /// An input is wrong.
-    #[error(transparent)]
-    Input(#[from] InputError),
 }
 
 /// The message for an unknown method, with the known ids.
@@ -369,11 +351,11 @@ impl Study {
     /// The methods of the study, or by default all but those on request.
     ///
     /// # Errors
-    /// [`StudyError::Value`] for an id that no method has, and for two rows of one name.
+    /// For an id that no method has, and for two rows of one name.
     pub fn entries<'r>(
         &self,
         registry: &'r Registry,
-    ) -> Result<Vec<(StudyMethod, &'r Entry)>, StudyError> {
+    ) -> Result<Vec<(StudyMethod, &'r Entry)>, Failure> {
         let mut methods = self.methods.clone();
         if methods.is_empty() {
             methods = registry.usual().map(|e| StudyMethod::of(e.id())).collect();
@@ -390,7 +372,7 @@ impl Study {
         let mut found: Vec<(StudyMethod, &Entry)> = Vec::new();
         for method in &methods {
             let entry = registry.entry(&method.id);
-            let entry = entry.ok_or_else(|| StudyError::Value(registry.no_such(&method.id)))?;
+            let entry = entry.ok_or_else(|| Failure::usage(registry.no_such(&method.id)))?;
             // The same row twice would be one row with twice the weight.
             if found.iter().any(|(other, _)| other == method) {
                 continue;
@@ -400,7 +382,7 @@ impl Study {
                 && registry.entry(name).is_some()
             {
                 let id = &method.id;
-                return Err(StudyError::Value(format!(
+                return Err(Failure::usage(format!(
                     "methods: the name `{name}` is the id of a method (found as the name of a variant of `{id}`); \
                      choose another name"
                 )));
@@ -408,7 +390,7 @@ impl Study {
             if let Some(name) = &method.name
                 && found.iter().any(|(other, _)| other.name.as_ref() == Some(name))
             {
-                return Err(StudyError::Value(format!(
+                return Err(Failure::usage(format!(
                     "two methods have the name `{name}`; rename one"
                 )));
             }
@@ -421,7 +403,7 @@ impl Study {
     ///
     /// # Errors
     /// When one does not exist or cannot be an input.
-    pub fn sources(&self) -> Result<Vec<Source>, StudyError> {
+    pub fn sources(&self) -> Result<Vec<Source>, Failure> {
         let mut sources = Vec::new();
         for mesh in &self.meshes {
             sources.push(Source::parse(&self.resolved(mesh))?);
@@ -443,7 +425,7 @@ impl Study {
     ///
     /// # Errors
     /// As [`Study::check`], [`Study::entries`] and [`Study::sources`].
-    pub fn items(&self, registry: &Registry, here: &Provenance) -> Result<Vec<Item>, StudyError> {
+    pub fn items(&self, registry: &Registry, here: &Provenance) -> Result<Vec<Item>, Failure> {
         self.check()?;
         let methods = self.entries(registry)?;
         let sources = self.sources()?;
@@ -512,7 +494,7 @@ impl Study {
     ///
     /// # Errors
     /// As [`Study::sources`].
-    pub fn retain_groups(&mut self) -> Result<Vec<String>, StudyError> {
+    pub fn retain_groups(&mut self) -> Result<Vec<String>, Failure> {
         let known = self.mesh_names(&unique_names(&self.sources()?));
         let mut gone = Vec::new();
         for meshes in self.groups.values_mut() {
@@ -523,12 +505,12 @@ impl Study {
     }
 
     /// Refuses groups with meshes that the study does not have.
-    fn check_groups(&self, names: &[String]) -> Result<(), StudyError> {
+    fn check_groups(&self, names: &[String]) -> Result<(), Failure> {
         let known = self.mesh_names(names);
         for (group, meshes) in &self.groups {
             if let Some(mesh) = meshes.iter().find(|mesh| !known.contains(mesh)) {
                 let meant = did_you_mean(mesh, known.iter().map(String::as_str));
-                return Err(StudyError::Value(format!(
+                return Err(Failure::usage(format!(
                     "group {}: unknown mesh {}{meant} (expected one of: {})",
                     quoted(group),
                     quoted(mesh),
@@ -620,14 +602,14 @@ impl Study {
 /// one method on all meshes where N divides the number of methods.
 ///
 /// # Errors
-/// [`StudyError::Value`] where the text is not two numbers, the first from 1 to the second.
-pub fn shard(text: &str, items: &[Item]) -> Result<Vec<Item>, StudyError> {
+/// Where the text is not two numbers, the first from 1 to the second.
+pub fn shard(text: &str, items: &[Item]) -> Result<Vec<Item>, Failure> {
     let parsed = text.split_once('/').and_then(|(number, of)| {
         let (number, of): (usize, usize) = (number.parse().ok()?, of.parse().ok()?);
         (1..=of).contains(&number).then_some((number, of))
     });
     let (number, of) = parsed.ok_or_else(|| {
-        StudyError::Value(format!("--shard {text}: expected I/N with I from 1 to N"))
+        Failure::usage(format!("--shard {text}: expected I/N with I from 1 to N"))
     })?;
     let (mut own, mut mesh) = (Vec::new(), 0);
     for (place, item) in items.iter().enumerate() {

@@ -86,14 +86,13 @@ const MEDIAL: Layers<'_> = &[
 
 /// Inside `medial-bench`.
 const BENCH: Layers<'_> = &[
-    &["host", "process_tree"],
+    &["exit", "host", "process_tree"],
     &["progress", "provenance"],
     &["plugin"],
     &["check"],
     &["study"],
     &["store"],
     &["exec"],
-    &["exit"],
     &["args", "interrupt"],
     &["output"],
     &["files"],
