@@ -7,6 +7,7 @@ use medial::complex::{self, MedialMesh, WRITABLE, single_precision_loss};
 use medial::shape::{Shape, ShapeOptions};
 use medial_run::axis::extension;
 use medial_run::input::{Input, Source};
+use medial_run::journal::replace_file;
 
 use crate::exit::Failure;
 
@@ -95,8 +96,7 @@ pub fn check_apart<'a>(
     Ok(())
 }
 
-/// Writes a file, complete or not at all.
+/// Writes a file, complete or not at all, and creates its folder.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    medial::write_atomically(path, |out| out.write_all(bytes))
-        .map_err(|error| Failure::at(path, error))
+    replace_file(path, bytes).map_err(|error| Failure::at(path, error))
 }

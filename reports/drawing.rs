@@ -12,9 +12,10 @@ use medial_run::text::{counted, significant};
 use serde::{Deserialize, Serialize};
 
 use crate::render::{
-    Background, Bar, Camera, ColourBy, Errors, Frame, Layer, Panel, Picture, RenderError, Scale,
-    Scene, Strip, painted, strip,
+    Bar, Camera, Errors, Frame, Layer, Panel, PanelRow, Picture, Scale, Strip, draw, painted, strip,
 };
+
+pub use crate::render::{Background, ColourBy, RenderError};
 
 /// Largest distance of a drawn reconstruction from the boundary of the union by default, a fraction of the diagonal.
 pub const TOLERANCE: f64 = 0.02;
@@ -226,7 +227,7 @@ impl Drawing {
         });
         let picture = picture?;
         let errors = deviations.iter().map(Deviation::figures).collect();
-        let (width, height) = (picture.width(), picture.height());
+        let Picture { width, height, .. } = picture;
         let Camera { direction, up, .. } = camera;
         let png = picture.to_png()?;
         Ok(Drawn { png, width, height, direction, up, errors, seconds: cost.seconds })
@@ -309,12 +310,8 @@ impl Content<'_> {
         let bar = bar.filter(|_| 2 * Bar::column(size) <= size[0]);
         let column = if bar.is_some() { Bar::column(size) } else { 0 };
         let frame = Frame::fit(&self.camera, &surface.vertices)?;
-        let scene = Scene { layers, size: [size[0] - column, size[1]], background };
-        let picture = scene.picture(&frame)?;
-        Ok(match bar {
-            Some(bar) => bar.beside(&picture, size, background),
-            None => picture,
-        })
+        let row = PanelRow { cells: vec![Some((layers, ""))], bar };
+        draw(vec![row], [size[0] - column, size[1]], background, &frame)
     }
 }
 

@@ -16,7 +16,7 @@
 //! | [`history`] | one file for each run, change points over many runs |
 //! | `pictures` | which results are shown next to each other |
 //! | [`drawing`] | one picture by its options |
-//! | [`render`] | pictures of surfaces and medial meshes as PNG |
+//! | `render` | pictures of surfaces and medial meshes as PNG |
 //! | `view3d` | geometry of the 3D views |
 //! | `page` | the self-contained `index.html` |
 //! | `site` | [`write_site`], the report with a page for each method and mesh |
@@ -36,7 +36,7 @@ mod overview;
 mod page;
 mod pictures;
 mod plots;
-pub mod render;
+mod render;
 mod site;
 mod statistics;
 mod summary;

@@ -1,22 +1,30 @@
 //! Which results the pictures show side by side.
 //!
 //! For each mesh one strip: the results of all methods at the count of [`answers`](crate::answers), or at a smaller one
-//! that has a smaller error, with external results at their counts, the least error first, and a 3D view of the same. Drawing needs the surfaces and the
-//! medial meshes, which are not in the records: the caller does it, with [`strip`](crate::render::strip).
+//! that has a smaller error, with external results at their counts, the least error first, and a 3D view of the same.
+//! The caller has the surfaces and the medial meshes, which are not in the records.
 
 use std::collections::BTreeMap;
 
+use medial::complex::MedialMesh;
 use medial::geometry::hash::splitmix;
+use medial::surface::TriMesh;
 use medial_run::record::{Record, Status};
 use medial_run::text::{file_stems, grouped};
 
 use crate::answers::usual_level;
 use crate::comparison::{Comparison, Entry, reached};
 use crate::metric::HAUSDORFF;
+use crate::render::{Background, Camera, ColourBy, Errors, Panel, Strip, strip};
+use crate::view3d::View3d;
 
 /// Folders of the pictures and of the 3D views, next to the page.
 pub(crate) const FOLDER: &str = "pictures";
 pub(crate) const VIEWS: &str = "views";
+
+/// Pixels of a panel, and panels in a row: a page of usual width shows them at about their size.
+const PANEL: [usize; 2] = [236, 192];
+const ACROSS: usize = 6;
 
 /// A strip of pictures that a report shows if it finds it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,6 +56,39 @@ impl PictureStrip {
         let hash = bytes.fold(0, |hash, byte| splitmix(hash ^ u64::from(byte)));
         self.view = format!("mesh-{stem}-{:08x}", hash >> 32);
         self.file = format!("{FOLDER}/{}.png", self.view);
+    }
+
+    /// The strip as PNG, the medial meshes above the surface with the errors of each, and the script of the 3D view.
+    ///
+    /// # Errors
+    /// When a medial mesh is empty or not valid, or the picture is too large.
+    pub fn draw(
+        &self,
+        surface: &TriMesh,
+        axes: &[MedialMesh],
+    ) -> Result<(Vec<u8>, String), String> {
+        let captions = || self.panels.iter().map(|(_, caption)| caption.clone());
+        let view = View3d::new(surface, captions().zip(axes).collect())?;
+        let panels = axes.iter().zip(captions()).zip(view.errors());
+        let panels: Vec<Panel<'_>> = panels
+            .map(|((axis, caption), errors)| {
+                let errors = Some(Errors { caption: caption.clone(), ..errors });
+                Panel { axis, caption, errors }
+            })
+            .collect();
+        let (low, high) = surface.bounding_box().unwrap_or_default();
+        let common = Strip {
+            surface,
+            diagonal: low.distance(high),
+            camera: Camera::fitting(surface),
+            size: PANEL,
+            across: ACROSS,
+            background: Background::WHITE,
+            colour: ColourBy::Radius,
+            max_error: None,
+        };
+        let png = strip(&panels, &common).and_then(|picture| picture.to_png());
+        Ok((png.map_err(|error| error.to_string())?, view.script(&self.view)))
     }
 
     /// Path of the 3D view, relative to the folder of the report.

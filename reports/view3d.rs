@@ -73,7 +73,7 @@ impl<'a> View3d<'a> {
 
     /// For each result how far its union reaches beyond the surface, at the vertices; negative where it falls
     /// short.
-    pub fn errors(&self) -> Vec<Errors<'_>> {
+    pub(crate) fn errors(&self) -> Vec<Errors<'_>> {
         let surface = &self.surface;
         let values = self.errors.iter();
         values.map(|values| Errors { mesh: surface, values, caption: String::new() }).collect()

@@ -7,9 +7,8 @@ use clap::builder::TypedValueParser;
 use medial::complex::MedialMesh;
 use medial::shape::ShapeOptions;
 use medial_reports::drawing::{
-    DrawError, Drawing, Drawn, Show, TOLERANCE, Upward, View, hausdorff_text,
+    Background, ColourBy, DrawError, Drawing, Drawn, Show, TOLERANCE, Upward, View, hausdorff_text,
 };
-use medial_reports::render::{Background, ColourBy};
 use medial_run::axis::read_axis;
 use serde_json::json;
 

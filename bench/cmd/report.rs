@@ -166,7 +166,6 @@ fn merge(dirs: &[PathBuf], out: &Path) -> Result<Vec<String>, Failure> {
             continue;
         };
         let bytes = fs::read(&from).map_err(|error| Failure::at(&from, error))?;
-        fs::create_dir_all(to.parent().unwrap_or(out)).map_err(|error| Failure::at(&to, error))?;
         files::write(&to, &bytes)?;
     }
     // The merged store gets the first study; its relative paths start at the folder that it names.
@@ -311,11 +310,8 @@ fn freeze(dir: &Path, records: &[Record], to: &Path, registry: &Registry) -> Res
     for artifact in &kept {
         let [from, target] = [dir, to].map(|folder| folder.join(artifact));
         let bytes = fs::read(&from).map_err(|error| Failure::at(&from, error))?;
-        fs::create_dir_all(target.parent().unwrap_or(to))
-            .map_err(|error| Failure::at(to, error))?;
         files::write(&target, &bytes)?;
     }
-    fs::create_dir_all(to).map_err(|error| Failure::at(to, error))?;
     files::write(&to.join(editions::RECORDS), &packed)?;
     files::write(&to.join(editions::DESCRIPTION), text.as_bytes())
 }

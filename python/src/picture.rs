@@ -5,8 +5,7 @@ use std::sync::Arc;
 
 use medial::complex::MedialMesh;
 use medial::shape::ShapeOptions;
-use medial_reports::drawing::{DrawError, Drawing, Show};
-use medial_reports::render::ColourBy;
+use medial_reports::drawing::{ColourBy, DrawError, Drawing, Show};
 use medial_reports::results_csv;
 use medial_run::record::Record;
 use pyo3::prelude::*;

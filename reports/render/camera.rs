@@ -11,13 +11,13 @@ use super::RenderError;
 
 /// Where a picture is taken from.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Camera {
+pub(crate) struct Camera {
     /// From the shape to the eye, of any length.
-    pub direction: Vec3,
+    pub(crate) direction: Vec3,
     /// Upward direction on the picture, not parallel to the viewing direction.
-    pub up: Vec3,
+    pub(crate) up: Vec3,
     /// 1: the shape fills the picture; 2: twice as large.
-    pub zoom: f64,
+    pub(crate) zoom: f64,
 }
 
 /// Accepted zooms: coordinates on the picture must stay in the range of exact arithmetic.
@@ -36,20 +36,20 @@ const MARGIN: f64 = 0.04;
 
 impl Camera {
     /// A camera in a direction of the shape.
-    pub fn new(direction: Vec3, up: Vec3) -> Self {
+    pub(crate) fn new(direction: Vec3, up: Vec3) -> Self {
         Self { direction, up, zoom: 1.0 }
     }
 
     /// The camera that shows most of a shape: it looks along its shortest extent, from the side and from above. Extents
     /// are those along the coordinates, or along the principal axes of its area if these enclose it much more tightly.
-    pub fn fitting(mesh: &TriMesh) -> Self {
+    pub(crate) fn fitting(mesh: &TriMesh) -> Self {
         let [across, up, towards] = standing_axes(mesh);
         Self::new(around(across, up, towards, TURN), up)
     }
 
     /// A camera at an azimuth and an elevation in degrees around an upward direction. Azimuth 0 is the front: `+z`, and
     /// `-y` where `z` is up.
-    pub fn around(up: Vec3, azimuth: f64, elevation: f64) -> Self {
+    pub(crate) fn around(up: Vec3, azimuth: f64, elevation: f64) -> Self {
         let up = up.normalize_or(Vec3::Y);
         let front = if up.z.abs() > 0.9 { -Vec3::Y } else { Vec3::Z };
         let front = front.reject_from_normalized(up).normalize_or(up.any_orthonormal_vector());
@@ -57,7 +57,7 @@ impl Camera {
     }
 
     /// The upward direction that [`Camera::fitting`] takes.
-    pub fn fitting_up(mesh: &TriMesh) -> Vec3 {
+    pub(crate) fn fitting_up(mesh: &TriMesh) -> Vec3 {
         standing_axes(mesh)[1]
     }
 }
@@ -134,7 +134,7 @@ fn dominant_axis(matrix: DMat3) -> Vec3 {
 
 /// A camera that was set up before a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
+pub(crate) struct Frame {
     /// Axes of the picture; `back` points from the shape to the eye.
     pub(super) right: Vec3,
     pub(super) up: Vec3,
@@ -148,10 +148,7 @@ pub struct Frame {
 
 impl Frame {
     /// Sets a camera up so that points fill the picture. Cost linear in their number.
-    ///
-    /// # Errors
-    /// When the camera has no direction or its zoom is out of range, or there is no point.
-    pub fn fit(camera: &Camera, points: &[Vec3]) -> Result<Self, RenderError> {
+    pub(crate) fn fit(camera: &Camera, points: &[Vec3]) -> Result<Self, RenderError> {
         let &Camera { direction, up, zoom } = camera;
         let back = direction.try_normalize().ok_or(RenderError::Direction(words(direction)))?;
         // Nearly along the line of sight, rounding would decide the upward direction.

@@ -19,15 +19,19 @@ mod strip;
 #[cfg(test)]
 mod tests;
 
-pub use camera::{Camera, Frame};
-pub use medial::ColourMap;
-pub use picture::{Background, Bar, Picture};
-pub use scale::Scale;
-pub use scene::{Layer, Scene};
-pub use strip::{ColourBy, Errors, Panel, Strip, painted, strip};
+pub(crate) use camera::{Camera, Frame};
+pub(crate) use medial::ColourMap;
+pub use picture::Background;
+pub(crate) use picture::{Bar, Picture};
+pub(crate) use scale::Scale;
+pub(crate) use scene::Layer;
+#[cfg(test)]
+use scene::Scene;
+pub use strip::ColourBy;
+pub(crate) use strip::{Errors, Panel, PanelRow, Strip, draw, painted, strip};
 
 /// The longest side of a picture, in pixels. Edge functions stay exact up to it.
-pub const MOST_PIXELS: usize = 8192;
+const MOST_PIXELS: usize = 8192;
 
 /// The shortest side.
 const FEWEST_PIXELS: usize = 16;

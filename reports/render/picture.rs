@@ -22,7 +22,6 @@ pub enum Background {
 impl FromStr for Background {
     type Err = &'static str;
 
-    /// The background by name or code.
     fn from_str(text: &str) -> Result<Self, &'static str> {
         let found = match text {
             "white" => Some(Self::WHITE),
@@ -41,8 +40,7 @@ impl FromStr for Background {
 }
 
 impl Background {
-    /// White.
-    pub const WHITE: Self = Self::Colour([255; 3]);
+    pub(crate) const WHITE: Self = Self::Colour([255; 3]);
 
     /// The pixel of it.
     pub(super) fn pixel(self) -> [u8; 4] {
@@ -65,9 +63,9 @@ impl Background {
 
 /// A picture of 8-bit sRGB pixels with straight alpha.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture {
-    pub(super) width: usize,
-    pub(super) height: usize,
+pub(crate) struct Picture {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
     /// Row by row from the top.
     pub(super) pixels: Vec<[u8; 4]>,
 }
@@ -78,18 +76,9 @@ impl Picture {
         Self { width, height, pixels: vec![background.pixel(); width * height] }
     }
 
-    /// Width in pixels.
-    pub fn width(&self) -> usize {
-        self.width
-    }
-
-    /// Height in pixels.
-    pub fn height(&self) -> usize {
-        self.height
-    }
-
     /// A pixel, from the top left corner.
-    pub fn pixel(&self, x: usize, y: usize) -> Option<[u8; 4]> {
+    #[cfg(test)]
+    pub(super) fn pixel(&self, x: usize, y: usize) -> Option<[u8; 4]> {
         (x < self.width).then(|| self.pixels.get(y * self.width + x).copied()).flatten()
     }
 
@@ -144,10 +133,7 @@ impl Picture {
     }
 
     /// The picture as a PNG file. The same picture gives the same bytes.
-    ///
-    /// # Errors
-    /// [`RenderError::Png`] when it cannot be encoded.
-    pub fn to_png(&self) -> Result<Vec<u8>, RenderError> {
+    pub(crate) fn to_png(&self) -> Result<Vec<u8>, RenderError> {
         // Without alpha where all pixels are opaque: a quarter less to store.
         let opaque = self.pixels.iter().all(|pixel| pixel[3] == 255);
         let channels = if opaque { 3 } else { 4 };
@@ -203,15 +189,14 @@ pub(super) fn fitted(text: &str, size: f64, most: f64) -> String {
 
 /// A colour bar: the meaning of the colours, next to a picture.
 #[derive(Clone, Debug)]
-pub struct Bar {
-    /// The colours and their range.
-    pub scale: Scale,
+pub(crate) struct Bar {
+    pub(crate) scale: Scale,
     /// Values are shown times this: 100 over the bounding-box diagonal for percentages of it.
-    pub times: f64,
+    pub(crate) times: f64,
     /// Lines above the bar.
-    pub title: Vec<String>,
+    pub(crate) title: [&'static str; 2],
     /// Lines below it.
-    pub note: Vec<String>,
+    pub(crate) note: &'static [&'static str],
 }
 
 /// Height of a capital as a share of a picture's shorter side, and the least in pixels.
@@ -235,18 +220,8 @@ pub(super) fn letter_size([width, height]: [usize; 2]) -> f64 {
 
 impl Bar {
     /// The width of the column that bars take next to a picture of this size, in pixels.
-    pub fn column(size: [usize; 2]) -> usize {
+    pub(crate) fn column(size: [usize; 2]) -> usize {
         (COLUMN * letter_size(size)).ceil() as usize
-    }
-
-    /// A picture with the bar to its right, wider by [`Bar::column`] of `size`, the size by which letters are chosen.
-    pub fn beside(&self, picture: &Picture, size: [usize; 2], background: Background) -> Picture {
-        let wide = [picture.width() + Self::column(size), picture.height()];
-        let mut whole = Picture::blank(wide, background);
-        whole.paste(picture, [0, 0]);
-        let ink = background.ink();
-        self.draw(&mut whole, [picture.width(), 0], wide[1], letter_size(size), ink);
-        whole
     }
 
     /// Draws the bar into a column: its left top corner, its height, the height of a capital.
@@ -262,13 +237,13 @@ impl Bar {
         let tall = (height as f64 - text - 2.0 * size).min(TALLEST * size).max(size);
         let left = left as f64 + 0.5 * size;
         let mut y = top as f64 + 0.5 * (height as f64 - text - tall) + LINE * size;
-        for line in &self.title {
+        for line in self.title {
             picture.write([left, y], line, size, ink);
             y += LINE * size;
         }
         let bar_top = y - 0.4 * size;
         y = bar_top + tall + LINE * size + 0.6 * size;
-        for line in &self.note {
+        for line in self.note {
             picture.write([left, y], line, size, ink);
             y += LINE * size;
         }

@@ -5,25 +5,22 @@ use medial::complex::MedialMesh;
 
 /// A colour map over a range of values.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scale {
-    /// The value at the low end.
-    pub lo: f64,
-    /// The value at the high end.
-    pub hi: f64,
-    /// The colours.
-    pub map: ColourMap,
+pub(crate) struct Scale {
+    pub(crate) lo: f64,
+    pub(crate) hi: f64,
+    pub(crate) map: ColourMap,
 }
 
 impl Scale {
     /// Radii from the least to the largest of some medial meshes.
-    pub fn radii<'m>(meshes: impl IntoIterator<Item = &'m MedialMesh>) -> Self {
+    pub(crate) fn radii<'m>(meshes: impl IntoIterator<Item = &'m MedialMesh>) -> Self {
         let radii = meshes.into_iter().flat_map(|mesh| mesh.spheres.iter().map(|s| s.radius));
         let (lo, hi) = radii.fold((f64::INFINITY, 0.0), |(lo, hi), r| (r.min(lo), r.max(hi)));
         Self { lo: lo.min(hi), hi, map: ColourMap::Viridis }
     }
 
     /// Errors of either sign up to a largest.
-    pub fn errors(largest: f64) -> Self {
+    pub(crate) fn errors(largest: f64) -> Self {
         Self { lo: -largest, hi: largest, map: ColourMap::Diverging }
     }
 

@@ -15,18 +15,17 @@ use super::{FEWEST_PIXELS, MOST_PIXELS, RenderError};
 
 /// A picture's content, without the camera.
 #[derive(Clone, Debug)]
-pub struct Scene<'a> {
+pub(crate) struct Scene<'a> {
     /// The drawn layers, all in one unit.
-    pub layers: Vec<Layer<'a>>,
+    pub(crate) layers: Vec<Layer<'a>>,
     /// Width and height in pixels.
-    pub size: [usize; 2],
-    /// The background.
-    pub background: Background,
+    pub(crate) size: [usize; 2],
+    pub(crate) background: Background,
 }
 
 /// Something to draw.
 #[derive(Clone, Copy, Debug)]
-pub enum Layer<'a> {
+pub(crate) enum Layer<'a> {
     /// A closed surface, in plain grey.
     Surface(&'a TriMesh),
     /// A closed surface as faint glass: its rims and its sharp edges, with the inside visible.
@@ -34,18 +33,10 @@ pub enum Layer<'a> {
     /// A closed surface as glass where nothing else is: the missing parts of a reconstruction.
     Ghost(&'a TriMesh),
     /// A surface coloured by a value at each vertex.
-    Values {
-        /// The surface.
-        mesh: &'a TriMesh,
-        /// A value for each vertex.
-        values: &'a [f64],
-        /// The colours of the values.
-        scale: Scale,
-    },
+    Values { mesh: &'a TriMesh, values: &'a [f64], scale: Scale },
     /// A medial mesh: faces as sheets with their edges, edges without a face as tubes, spheres without an edge as
     /// balls.
     Axis {
-        /// The medial mesh.
         mesh: &'a MedialMesh,
         /// The colours of the spheres' radii; without them one colour for sheets and one for curves.
         colour: Option<Scale>,
@@ -55,27 +46,7 @@ pub enum Layer<'a> {
 impl Scene<'_> {
     /// Takes the picture. Parallel; the same pixels for any number of threads. Time linear in the number of triangles
     /// and of pixels.
-    ///
-    /// ```
-    /// use medial::Vec3;
-    /// use medial::surface::TriMesh;
-    /// use medial_reports::render::{Background, Camera, Frame, Layer, Scene};
-    ///
-    /// let vertices = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
-    /// let faces = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
-    /// let tetrahedron = TriMesh { vertices, faces };
-    /// let layers = vec![Layer::Surface(&tetrahedron)];
-    /// let scene = Scene { layers, size: [320, 240], background: Background::WHITE };
-    /// let camera = Camera::fitting(&tetrahedron);
-    /// let picture = scene.picture(&Frame::fit(&camera, &tetrahedron.vertices)?)?;
-    /// assert_eq!(picture.pixel(0, 0), Some([255; 4]));
-    /// assert!(picture.to_png()?.starts_with(b"\x89PNG"));
-    /// # Ok::<(), medial_reports::render::RenderError>(())
-    /// ```
-    ///
-    /// # Errors
-    /// When a side of the picture is out of range, or a layer's values are not one for each vertex.
-    pub fn picture(&self, frame: &Frame) -> Result<Picture, RenderError> {
+    pub(crate) fn picture(&self, frame: &Frame) -> Result<Picture, RenderError> {
         let [width, height] = self.size;
         // Too small to be a picture, or too large for the exact arithmetic of edges.
         if !self.size.iter().all(|side| (FEWEST_PIXELS..=MOST_PIXELS).contains(side)) {

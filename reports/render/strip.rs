@@ -1,4 +1,4 @@
-//! The strip: several medial meshes of one shape side by side, from one camera and with one scale.
+//! Panels side by side: medial meshes of one shape from one camera and with one scale, and the bar that explains it.
 
 use medial::ColourMap;
 use medial::complex::{MedialMesh, SheetGraph, SheetOptions};
@@ -21,13 +21,13 @@ pub enum ColourBy {
     Radius,
     /// One colour for sheets, one for curves.
     Plain,
-    /// Sheets in separate colours, seams black: of meshes whose radii are those of [`painted`].
+    /// Sheets in separate colours, seams black: of the meshes of `painted`, whose radii are colours.
     #[serde(skip)]
     Sheets,
 }
 
 /// The sheets, seams and junctions of a medial mesh in diagonals of its surface, for [`ColourBy::Sheets`].
-pub fn painted(mesh: &MedialMesh) -> MedialMesh {
+pub(crate) fn painted(mesh: &MedialMesh) -> MedialMesh {
     let (mut painted, colours) = SheetGraph::new(mesh, SheetOptions::default()).painted(mesh);
     for (sphere, colour) in painted.spheres.iter_mut().zip(colours) {
         sphere.radius = colour;
@@ -37,26 +37,24 @@ pub fn painted(mesh: &MedialMesh) -> MedialMesh {
 
 impl ColourBy {
     /// The colours for some medial meshes of a shape with this bounding-box diagonal, and the bar that explains them.
-    pub fn of(self, meshes: &[&MedialMesh], diagonal: f64) -> (Option<Scale>, Option<Bar>) {
+    pub(crate) fn of(self, meshes: &[&MedialMesh], diagonal: f64) -> (Option<Scale>, Option<Bar>) {
         if self == Self::Sheets {
             return (Some(Scale { lo: 0.0, hi: 1.0, map: ColourMap::Parts }), None);
         }
         let scale = (self == Self::Radius).then(|| Scale::radii(meshes.iter().copied()));
-        let title = vec!["radius".into(), "% of diagonal".into()];
-        let bar = |scale| Bar { scale, times: 100.0 / diagonal, title, note: vec![] };
+        let title = ["radius", "% of diagonal"];
+        let bar = |scale| Bar { scale, times: 100.0 / diagonal, title, note: &[] };
         (scale, scale.map(bar))
     }
 }
 
 /// A surface with its signed distances from another.
 #[derive(Clone, Debug)]
-pub struct Errors<'a> {
-    /// The surface.
-    pub mesh: &'a TriMesh,
+pub(crate) struct Errors<'a> {
+    pub(crate) mesh: &'a TriMesh,
     /// For each vertex its distance, positive outside, in the unit of the mesh.
-    pub values: &'a [f64],
-    /// The caption.
-    pub caption: String,
+    pub(crate) values: &'a [f64],
+    pub(crate) caption: String,
 }
 
 /// Share of the values of a surface that a scale chosen from them spans; the rest has the colours of its ends.
@@ -74,7 +72,7 @@ impl Errors<'_> {
     /// The end of a scale for several surfaces, in their unit. It is chosen for the better half of them, whose errors it
     /// must show: the geometric mean of the distances that 90 % of the vertices of each are within. Round as a percentage
     /// of a diagonal.
-    pub fn common_scale(all: &[&Self], diagonal: f64) -> f64 {
+    pub(crate) fn common_scale(all: &[&Self], diagonal: f64) -> f64 {
         let mut ends: Vec<f64> = all.iter().map(|errors| errors.usual() / diagonal).collect();
         ends.sort_by(f64::total_cmp);
         ends.truncate(ends.len().div_ceil(2));
@@ -85,48 +83,39 @@ impl Errors<'_> {
     }
 
     /// The bar of errors up to `end`, with a remark where values are beyond.
-    pub fn bar(all: &[&Self], end: f64, diagonal: f64) -> Bar {
+    pub(crate) fn bar(all: &[&Self], end: f64, diagonal: f64) -> Bar {
         let is_clipped = all.iter().any(|errors| errors.values.iter().any(|v| v.abs() > end));
         let note: &[&str] = if is_clipped { &["larger values:", "last colour"] } else { &[] };
-        Bar {
-            scale: Scale::errors(end),
-            times: 100.0 / diagonal,
-            title: vec!["error".into(), "% of diagonal".into()],
-            note: note.iter().map(|line| (*line).to_owned()).collect(),
-        }
+        let title = ["error", "% of diagonal"];
+        Bar { scale: Scale::errors(end), times: 100.0 / diagonal, title, note }
     }
 }
 
 /// A medial mesh in a strip.
 #[derive(Clone, Debug)]
-pub struct Panel<'a> {
-    /// The medial mesh.
-    pub axis: &'a MedialMesh,
-    /// The caption.
-    pub caption: String,
+pub(crate) struct Panel<'a> {
+    pub(crate) axis: &'a MedialMesh,
+    pub(crate) caption: String,
     /// Its reconstruction, for the second row.
-    pub errors: Option<Errors<'a>>,
+    pub(crate) errors: Option<Errors<'a>>,
 }
 
 /// Shared settings of the panels of a strip.
 #[derive(Clone, Debug)]
-pub struct Strip<'a> {
+pub(crate) struct Strip<'a> {
     /// The surface that the medial meshes are of: drawn as glass around them; it sets up the camera.
-    pub surface: &'a TriMesh,
+    pub(crate) surface: &'a TriMesh,
     /// Bounding-box diagonal of the surface, of which bars show percentages.
-    pub diagonal: f64,
-    /// Where all panels are seen from.
-    pub camera: Camera,
+    pub(crate) diagonal: f64,
+    pub(crate) camera: Camera,
     /// Width and height of a panel, without its caption.
-    pub size: [usize; 2],
+    pub(crate) size: [usize; 2],
     /// Panels in a line.
-    pub across: usize,
-    /// The background.
-    pub background: Background,
-    /// The colours of the medial meshes.
-    pub colour: ColourBy,
+    pub(crate) across: usize,
+    pub(crate) background: Background,
+    pub(crate) colour: ColourBy,
     /// The end of the scale of errors, in the unit of the surface; chosen from the errors without one.
-    pub max_error: Option<f64>,
+    pub(crate) max_error: Option<f64>,
 }
 
 /// More pixels than this in one picture are rejected as implausible.
@@ -135,10 +124,10 @@ const MOST_PIXELS_OF_ALL: usize = 1 << 27;
 /// Medial meshes next to each other: one panel each, its caption below. If any panel has errors, a second row shows the
 /// reconstructions coloured by error, with missing parts as glass. Colours are on one scale along a row, which a bar at
 /// its end shows.
-///
-/// # Errors
-/// When there is no panel, the camera cannot be set up, or the picture is too large.
-pub fn strip<'a>(panels: &'a [Panel<'a>], strip: &'a Strip<'a>) -> Result<Picture, RenderError> {
+pub(crate) fn strip<'a>(
+    panels: &'a [Panel<'a>],
+    strip: &'a Strip<'a>,
+) -> Result<Picture, RenderError> {
     if panels.is_empty() {
         return Err(RenderError::Empty);
     }
@@ -170,21 +159,28 @@ pub fn strip<'a>(panels: &'a [Panel<'a>], strip: &'a Strip<'a>) -> Result<Pictur
         );
         rows[first].bar = Some(Errors::bar(&errors, end, strip.diagonal));
     }
-    draw(rows, strip, &frame)
+    draw(rows, strip.size, strip.background, &frame)
 }
 
 /// A row of panels: the layers and the caption of each, and the bar at the end.
-struct PanelRow<'a> {
-    cells: Vec<Option<(Vec<Layer<'a>>, &'a str)>>,
-    bar: Option<Bar>,
+pub(crate) struct PanelRow<'a> {
+    pub(crate) cells: Vec<Option<(Vec<Layer<'a>>, &'a str)>>,
+    pub(crate) bar: Option<Bar>,
 }
 
-fn draw(rows: Vec<PanelRow<'_>>, strip: &Strip<'_>, frame: &Frame) -> Result<Picture, RenderError> {
-    let &Strip { size, background, .. } = strip;
+/// Rows of panels of a size. Bars have a column at the right, and captions, if there are any, a line below each row.
+pub(crate) fn draw(
+    rows: Vec<PanelRow<'_>>,
+    size: [usize; 2],
+    background: Background,
+    frame: &Frame,
+) -> Result<Picture, RenderError> {
     let ([width, height], ink) = (size, background.ink());
     let letter = letter_size(size);
+    let mut cells = rows.iter().flat_map(|row| row.cells.iter().flatten());
     // A caption is one line of text with some room below.
-    let caption = (LINE * letter * 1.3).ceil() as usize;
+    let has_captions = cells.any(|(_, caption)| !caption.is_empty());
+    let caption = if has_captions { (LINE * letter * 1.3).ceil() as usize } else { 0 };
     let column = if rows.iter().any(|row| row.bar.is_some()) { Bar::column(size) } else { 0 };
     let columns = rows.iter().map(|row| row.cells.len()).max().unwrap_or(0);
     let whole = [columns * width + column, rows.len() * (height + caption)];

@@ -198,11 +198,11 @@ fn a_strip_has_a_panel_for_each_and_a_bar() {
     };
     let one = strip(&[panel(None), panel(None)], &common).expect("a strip");
     let two = strip(&[panel(Some(errors)), panel(None)], &common).expect("a strip");
-    assert_eq!(one.width(), 2 * 160 + Bar::column(common.size));
-    assert_eq!((two.width(), two.height()), (one.width(), 2 * one.height()));
+    assert_eq!(one.width, 2 * 160 + Bar::column(common.size));
+    assert_eq!((two.width, two.height), (one.width, 2 * one.height));
     // A third one begins the next line.
     let three = strip(&[panel(None), panel(None), panel(None)], &common).expect("a strip");
-    assert_eq!((three.width(), three.height()), (one.width(), 2 * one.height()));
+    assert_eq!((three.width, three.height), (one.width, 2 * one.height));
     // Alike but for the place: panels of one mesh are one picture.
     let column = |x: usize| (0..120).filter_map(|y| one.pixel(x, y)).collect::<Vec<_>>();
     assert!((0..160).all(|x| column(x) == column(160 + x)));
