@@ -6,14 +6,14 @@
 use std::collections::HashMap;
 use std::fs::{DirEntry, File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::{fs, io};
 
 use medial::{read_regular, read_regular_text};
 use medial_run::item::Item;
 use medial_run::journal::{Journal, parse_records};
 use medial_run::level::Target;
-use medial_run::record::{Record, Status, file_inside};
+use medial_run::record::{Record, Status};
 
 use crate::exit::Failure;
 
@@ -261,12 +261,22 @@ fn read_known(path: &Path) -> io::Result<(HashMap<String, Record>, Vec<String>, 
     Ok((known.collect(), remarks, is_torn))
 }
 
-/// The file of a medial mesh that a record names, below the folder of a store; `None` for a path that leads elsewhere.
-// Records can come from elsewhere: they must not name other files for reading, writing or removal.
+/// The medial mesh of a record in the folder of its results; `None` for another file, and where the path leads out of
+/// that folder, by `..` or by a symbolic link in it. Records come from elsewhere and may name any file.
 pub fn artifact_path(dir: &Path, artifact: &str) -> Option<PathBuf> {
     let named = Path::new(artifact);
-    let is_own = named.starts_with(AXES) && named.extension().is_some_and(|end| end == "ma");
-    file_inside(dir, artifact).filter(|_| is_own)
+    if !named.starts_with(AXES) || named.extension().is_none_or(|end| end != "ma") {
+        return None;
+    }
+    let mut file = dir.to_owned(); // links of the folder itself are the user's
+    for part in named.components() {
+        let Component::Normal(part) = part else { return None };
+        file.push(part);
+        if file.is_symlink() {
+            return None;
+        }
+    }
+    Some(file)
 }
 
 fn remove(path: &Path) -> Result<(), Failure> {

@@ -1,21 +1,23 @@
 //! A picture of a surface and of medial meshes of it: the work of `render`, for the command and for Python.
 
+use std::fmt;
 use std::str::FromStr;
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, union_surface};
-use medial::metrics::{JudgeOptions, MetricError};
-use medial::shape::{Cost, Shape, ShapeError};
+use medial::metrics::JudgeOptions;
+use medial::shape::{Cost, Shape};
 use medial::surface::{SignedDistance, TriMesh};
 use medial_run::reconstruct::ReconstructError;
 use medial_run::text::{counted, significant};
 use serde::{Deserialize, Serialize};
 
 use crate::render::{
-    Bar, Camera, Errors, Frame, Layer, Panel, PanelRow, Picture, Scale, Strip, draw, painted, strip,
+    Bar, Camera, Errors, Frame, Layer, Panel, PanelRow, Picture, RenderError, Scale, Strip, draw,
+    painted, strip,
 };
 
-pub use crate::render::{Background, ColourBy, RenderError};
+pub use crate::render::{Background, ColourBy};
 
 /// Largest distance of a drawn reconstruction from the boundary of the union by default, a fraction of the diagonal.
 pub const TOLERANCE: f64 = 0.02;
@@ -90,73 +92,30 @@ pub struct DrawnError {
 }
 
 /// The reason for which there is no picture.
-#[derive(Debug, thiserror::Error)]
-pub enum DrawError {
-    /// The content does not fit the number of medial meshes.
-    #[error("show {0}")]
-    Show(String),
-    /// An option of the scene is wrong.
-    #[error("{}{error}", option_of(error))]
-    Render {
-        /// The reason.
-        error: RenderError,
-    },
-    /// A fraction of the diagonal is out of range.
-    #[error("{option} {value}: expected a number above 0 and at most 1")]
-    Fraction {
-        /// The option.
-        option: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// A medial mesh has no reconstruction.
-    #[error("{name}: {error}")]
-    Reconstruction {
-        /// The medial mesh.
-        name: String,
-        /// The reason.
-        error: ReconstructError,
-    },
-    /// A medial mesh cannot be measured.
-    #[error("{name}: {error}")]
-    Metric {
-        /// The medial mesh.
-        name: String,
-        /// The reason.
-        error: MetricError,
-    },
-    /// The surface has no substrates.
-    #[error(transparent)]
-    Shape(#[from] ShapeError),
+#[derive(Debug)]
+pub struct DrawError {
+    /// The medial mesh that it is about.
+    pub axis: Option<String>,
+    /// Whether an option is wrong, rather than an input.
+    pub is_option: bool,
+    /// One line, which begins with the name of a wrong option.
+    pub message: String,
 }
 
 impl DrawError {
-    /// Whether an option is wrong, rather than an input.
-    pub fn is_option(&self) -> bool {
-        let is_too_fine = |error: &ReconstructError| {
-            matches!(error, ReconstructError::TooFine { .. } | ReconstructError::TooThin { .. })
-        };
-        match self {
-            Self::Show(_) | Self::Render { .. } | Self::Fraction { .. } => true,
-            Self::Reconstruction { error, .. } => is_too_fine(error),
-            Self::Metric { .. } | Self::Shape(_) => false,
-        }
+    fn option(message: impl ToString) -> Self {
+        Self { axis: None, is_option: true, message: message.to_string() }
+    }
+
+    fn input(message: impl ToString) -> Self {
+        Self { axis: None, is_option: false, message: message.to_string() }
     }
 }
 
-fn option_of(error: &RenderError) -> &'static str {
-    match error {
-        RenderError::Size { .. } => "size: ",
-        RenderError::Direction(_) => "camera: ",
-        RenderError::Up(_) => "up: ",
-        RenderError::Zoom(_) => "zoom: ",
-        RenderError::Empty | RenderError::Values { .. } | RenderError::Png(_) => "",
-    }
-}
-
-impl From<RenderError> for DrawError {
-    fn from(error: RenderError) -> Self {
-        Self::Render { error }
+impl fmt::Display for DrawError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let named = self.axis.iter().try_for_each(|name| write!(f, "{name}: "));
+        named.and_then(|()| f.write_str(&self.message))
     }
 }
 
@@ -164,7 +123,7 @@ impl Drawing {
     /// The content of a picture of some medial meshes.
     ///
     /// # Errors
-    /// [`DrawError::Show`] for a content that requires another number of medial meshes.
+    /// For a content that requires another number of medial meshes.
     pub fn content(&self, count: usize) -> Result<Show, DrawError> {
         let (show, problem) = match (self.show, count) {
             (None, 0) => return Ok(Show::Surface),
@@ -178,7 +137,7 @@ impl Drawing {
             (Some(show), _) => return Ok(show),
         };
         let word = serde_json::to_value(show).unwrap_or_default();
-        Err(DrawError::Show(format!("{}{problem}", word.as_str().unwrap_or_default())))
+        Err(DrawError::option(format!("show {}{problem}", word.as_str().unwrap_or_default())))
     }
 
     /// A picture of a shape and of named medial meshes in its normalised units. `at` gets each stage.
@@ -194,7 +153,8 @@ impl Drawing {
         let fractions = [("tolerance", Some(self.tolerance)), ("max_error", self.max_error)];
         for (option, value) in fractions {
             if let Some(value) = value.filter(|&x| !(x > 0.0 && x <= 1.0)) {
-                return Err(DrawError::Fraction { option, value });
+                let problem = format!("{option} {value}: expected a number above 0 and at most 1");
+                return Err(DrawError::option(problem));
             }
         }
         let show = self.content(axes.len())?;
@@ -208,13 +168,15 @@ impl Drawing {
         if matches!(show, Show::Error | Show::Reconstruction) {
             // As in `evaluate` by default: the drawn vertices are fewer and would give another number.
             let judge = (show == Show::Error).then(|| shape.judge(None, JudgeOptions::default()));
-            let judge = judge.transpose()?;
+            let judge = judge.transpose().map_err(DrawError::input)?;
             for (name, axis) in axes {
                 let mut made = Deviation::new(shape, name, axis, self.tolerance)?;
                 let measured = judge.as_ref().map(|judge| judge.distances(axis)).transpose();
-                let measured =
-                    measured.map_err(|error| DrawError::Metric { name: name.clone(), error })?;
-                made.hausdorff = measured.map(|distances| distances.hausdorff);
+                let measured = measured.map_err(|error| DrawError {
+                    axis: Some(name.clone()),
+                    ..DrawError::input(error)
+                });
+                made.hausdorff = measured?.map(|distances| distances.hausdorff);
                 deviations.push(made);
             }
         }
@@ -225,11 +187,11 @@ impl Drawing {
             0 | 1 => scene.single(deviations.first()),
             _ => scene.side_by_side(&deviations),
         });
-        let picture = picture?;
+        let picture = picture.map_err(DrawError::option)?;
         let errors = deviations.iter().map(Deviation::figures).collect();
         let Picture { width, height, .. } = picture;
         let Camera { direction, up, .. } = camera;
-        let png = picture.to_png()?;
+        let png = picture.to_png().map_err(DrawError::input)?;
         Ok(Drawn { png, width, height, direction, up, errors, seconds: cost.seconds })
     }
 
@@ -332,12 +294,16 @@ impl Deviation {
         axis: &MedialMesh,
         tolerance: f64,
     ) -> Result<Self, DrawError> {
-        let made = union_surface(axis, tolerance).map_err(|error| DrawError::Reconstruction {
-            name: name.to_owned(),
-            error: ReconstructError::of_contour(error, 1.0, TOLERANCE),
+        let made = union_surface(axis, tolerance).map_err(|error| {
+            let error = ReconstructError::of_contour(error, 1.0, TOLERANCE);
+            let is_option = matches!(
+                error,
+                ReconstructError::TooFine { .. } | ReconstructError::TooThin { .. }
+            );
+            DrawError { axis: Some(name.to_owned()), is_option, message: error.to_string() }
         });
         let mesh = made?.mesh;
-        let tree = shape.surface_tree()?;
+        let tree = shape.surface_tree().map_err(DrawError::input)?;
         let inside = shape.inside_test();
         let values = SignedDistance::closed(&tree, &inside).batch(&mesh.vertices);
         Ok(Self { mesh, values, hausdorff: None })

@@ -7,7 +7,6 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::path::{Component, Path, PathBuf};
 
 use medial::complex::MedialMesh;
 use medial::metrics::Evaluation;
@@ -104,20 +103,6 @@ impl Status {
             Self::InvalidOutput => "invalid_output",
         }
     }
-}
-
-/// The file of a path in a record, such as its medial mesh, in the folder of the results; `None` where the path leads out
-/// of that folder: absolute, by `..`, or by a symbolic link in it. Records come from elsewhere and may name any file.
-pub fn file_inside(folder: &Path, path: &str) -> Option<PathBuf> {
-    let mut file = folder.to_owned();
-    for part in Path::new(path).components() {
-        let Component::Normal(part) = part else { return None };
-        file.push(part);
-        if file.is_symlink() {
-            return None; // links of the folder itself are the user's
-        }
-    }
-    (file != folder).then_some(file)
 }
 
 impl fmt::Display for Status {

@@ -105,18 +105,14 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     };
     let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let failed = |error: DrawError| {
-        let code = if error.is_option() { Exit::Usage } else { Exit::Input };
+        let DrawError { axis, is_option, message } = error;
+        let code = if is_option { Exit::Usage } else { Exit::Input };
         // The file instead of the caption.
-        let file = |name: &str| arguments.axes.iter().find(|path| stem(path) == *name);
-        let message = match &error {
-            DrawError::Reconstruction { name, error } => {
-                file(name).map(|path| Failure::at(path, error))
-            }
-            DrawError::Metric { name, error } => file(name).map(|path| Failure::at(path, error)),
-            _ if error.is_option() => Some(Failure::usage(format!("--{error}"))),
-            _ => None,
+        let message = match arguments.axes.iter().find(|path| Some(stem(path)) == axis) {
+            Some(path) => Failure::at(path, message).message,
+            None if is_option => format!("--{message}"),
+            None => message,
         };
-        let message = message.map_or_else(|| error.to_string(), |failure| failure.message);
         Failure { code, message }
     };
     drawing.content(arguments.axes.len()).map_err(failed)?;

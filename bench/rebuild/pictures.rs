@@ -6,8 +6,10 @@ use std::path::Path;
 use medial_reports::{PictureStrip, picture_strips};
 use medial_run::input::{Input, Source};
 use medial_run::journal::replace_file;
-use medial_run::record::{Record, file_inside};
+use medial_run::record::Record;
 use rayon::prelude::*;
+
+use crate::store::artifact_path;
 
 /// Draws the strips of some records, whose medial meshes are in one folder, into another one. Strips whose input is
 /// missing or changed are skipped, and the reasons returned. Existing strips are not drawn again: their names identify
@@ -43,7 +45,7 @@ fn draw_strip(
     let input = input.ok_or("the measured surface is missing or has changed")?;
     let mut axes = Vec::new();
     for (artifact, _) in &wanted.panels {
-        let path = file_inside(from, artifact);
+        let path = artifact_path(from, artifact);
         let path = path.ok_or_else(|| format!("{artifact}: not inside the folder"))?;
         let loaded = medial::complex::read(&path);
         axes.push(loaded.map_err(|error| format!("{}: {error}", path.display()))?.mesh);

@@ -36,42 +36,29 @@ const MOST_PIXELS: usize = 8192;
 /// The shortest side.
 const FEWEST_PIXELS: usize = 16;
 
-/// Why there is no picture.
+/// Why there is no picture: messages begin with the option that is wrong.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RenderError {
-    /// A side of the picture is too short or too long.
+pub(crate) enum RenderError {
     #[error(
-        "a picture of {width} by {height} pixels: out of range (expected 16 to {MOST_PIXELS} a side)"
+        "size: a picture of {width} by {height} pixels: out of range (expected 16 to {MOST_PIXELS} a side)"
     )]
-    Size {
-        /// Width in pixels.
-        width: usize,
-        /// Height in pixels.
-        height: usize,
-    },
-    /// The camera has no direction.
-    #[error("the camera looks from {0}: not a direction (expected three numbers, not all zero)")]
+    Size { width: usize, height: usize },
+    #[error(
+        "camera: the camera looks from {0}: not a direction (expected three numbers, not all zero)"
+    )]
     Direction(String),
-    /// The camera has no upward direction.
-    #[error("{0}: not an upward direction (found a line of sight, expected a direction across it)")]
+    #[error(
+        "up: {0}: not an upward direction (found a line of sight, expected a direction across it)"
+    )]
     Up(String),
-    /// The zoom is out of range.
-    #[error("a zoom of {0}: out of range (expected 0.05 to 50)")]
+    #[error("zoom: a zoom of {0}: out of range (expected 0.05 to 50)")]
     Zoom(f64),
-    /// There is no finite point to set the camera up by.
     #[error("nothing to draw: no finite point")]
     Empty,
-    /// A layer has another number of values than vertices.
     #[error(
         "values of a layer: wrong number (found {values}, expected {vertices}, one for each vertex)"
     )]
-    Values {
-        /// Number of values.
-        values: usize,
-        /// Number of vertices.
-        vertices: usize,
-    },
-    /// The picture could not be encoded.
+    Values { values: usize, vertices: usize },
     #[error("PNG: {0}")]
     Png(String),
 }

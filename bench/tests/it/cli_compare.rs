@@ -315,6 +315,13 @@ fn faults_of_a_study_are_refused_before_any_run() {
         ("spheres = [1,\nmeshes = 3".to_owned(), 1, "study.toml: line "),
         (format!("meshes = []\nspheres = \"{long}\""), 1, "study.toml: line 2: invalid type"),
         (format!("[[method]]\nid = \"{long}\""), 2, "unknown method `nnn"),
+        ("[[method]]\nid = \"qmad\"".to_owned(), 2, "did you mean `qmat`"),
+        ("[[method]]\nname = \"x\"".to_owned(), 1, "missing field `id`"),
+        ("spheres = [-3]".to_owned(), 1, "study.toml: line 1"),
+        ("timeout = 0".to_owned(), 2, "--timeout 0"),
+        ("threads = 0".to_owned(), 2, "--threads 0"),
+        ("meshes = [\"nowhere.off\"]".to_owned(), 1, "nowhere.off"),
+        ("plugins = [\"nowhere.toml\"]".to_owned(), 2, "nowhere.toml"),
     ] {
         fs::write(&file, text).expect("written");
         let words = ["compare", "--study", &file, "--out", &out];

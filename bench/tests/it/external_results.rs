@@ -5,7 +5,17 @@ use std::fs;
 use medial_run::input::{Input, Source};
 use serde_json::{Value, json};
 
-use crate::command::{done, folder, records, run};
+use crate::command::{done, folder, records, run, words};
+
+/// A folder `theirs` of medial meshes of the built-in capsule: each a number of spheres and a name.
+fn theirs(at: &impl Fn(&str) -> String, meshes: &[(&str, &str)]) -> String {
+    fs::create_dir(at("theirs")).expect("a folder");
+    for (count, name) in meshes {
+        let file = at(&format!("theirs/{name}.ma"));
+        done(&["simplify", "builtin:capsule", "-m", "qmat", "--spheres", count, "-o", &file]);
+    }
+    at("theirs")
+}
 
 /// The records of external results among those of `medial compare --given theirs=GIVEN`.
 fn compared_with(given: &str, out: &str) -> Vec<Value> {
@@ -18,11 +28,7 @@ fn compared_with(given: &str, out: &str) -> Vec<Value> {
 #[test]
 fn only_title_citation_and_seconds_of_a_folder_are_claims() {
     let at = folder();
-    fs::create_dir(at("theirs")).expect("a folder");
-    for count in ["20", "30"] {
-        let file = at(&format!("theirs/capsule-{count}.ma"));
-        done(&["simplify", "builtin:capsule", "-m", "qmat", "--spheres", count, "-o", &file]);
-    }
+    theirs(&at, &[("20", "capsule-20"), ("30", "capsule-30")]);
     let claims =
         "title = \"Their method\"\ncitation = \"Them, 2026\"\nseconds = { capsule-20 = 1.5 }\n";
     fs::write(at("theirs/method.toml"), claims).expect("written");
@@ -89,9 +95,7 @@ fn refused(given: &str, out: &str) -> String {
 #[test]
 fn a_forged_folder_is_refused_or_measured() {
     let at = folder();
-    fs::create_dir(at("theirs")).expect("a folder");
-    let good = at("theirs/capsule-20.ma");
-    done(&["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "-o", &good]);
+    let good = theirs(&at, &[("20", "capsule-20")]) + "/capsule-20.ma";
     let mesh = fs::read_to_string(&good).expect("read");
     let long = "x".repeat(200_000);
     let claims = [
@@ -144,9 +148,7 @@ fn a_forged_folder_is_refused_or_measured() {
 fn links_that_lead_out_of_a_folder_are_refused() {
     use std::os::unix::fs::symlink;
     let at = folder();
-    fs::create_dir(at("theirs")).expect("a folder");
-    let good = at("theirs/capsule-20.ma");
-    done(&["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "-o", &good]);
+    let good = theirs(&at, &[("20", "capsule-20")]) + "/capsule-20.ma";
     fs::write(at("secret"), "password = 1\n").expect("written");
     fs::copy(&good, at("outside.ma")).expect("copied");
     for (link, target) in [
@@ -174,9 +176,7 @@ fn links_that_lead_out_of_a_folder_are_refused() {
 #[test]
 fn files_of_a_folder_are_read_or_named() {
     let at = folder();
-    fs::create_dir(at("theirs")).expect("a folder");
-    let mesh = at("theirs/capsule-20.ma");
-    done(&["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "-o", &mesh]);
+    theirs(&at, &[("20", "capsule-20")]);
     for (name, spheres) in [("capsule-4.csv", 4), ("capsule-5.sph", 5)] {
         let rows: Vec<String> =
             (0..spheres).map(|k| format!("{} 0 0 0.2", 0.1 * f64::from(k))).collect();
@@ -203,11 +203,7 @@ fn files_of_a_folder_are_read_or_named() {
 #[test]
 fn a_count_in_the_name_within_2_percent_is_the_requested_one() {
     let at = folder();
-    fs::create_dir(at("theirs")).expect("a folder");
-    for (count, name) in [("99", "capsule-100"), ("50", "capsule-60")] {
-        let file = at(&format!("theirs/{name}.ma"));
-        done(&["simplify", "builtin:capsule", "-m", "qmat", "--spheres", count, "-o", &file]);
-    }
+    theirs(&at, &[("99", "capsule-100"), ("50", "capsule-60")]);
     let theirs = compared_with(&at("theirs"), &at("report"));
     let counts = theirs.iter().map(|record| {
         let simplify = &record["simplify"];
@@ -219,9 +215,7 @@ fn a_count_in_the_name_within_2_percent_is_the_requested_one() {
 #[test]
 fn a_site_has_a_page_for_each_method_mesh_and_external_result() {
     let at = folder();
-    fs::create_dir(at("theirs")).expect("a folder");
-    let file = at("theirs/capsule-20.ma");
-    done(&["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "-o", &file]);
+    theirs(&at, &[("20", "capsule-20")]);
     let claims = "title = \"Their <method>\"\nbibtex = \"@misc{them, title = {Theirs}}\"\nmachine = \"a laptop\"\n";
     fs::write(at("theirs/method.toml"), claims).expect("written");
     compared_with(&at("theirs"), &at("report"));
@@ -279,16 +273,9 @@ fn a_site_has_a_page_for_each_method_mesh_and_external_result() {
 #[test]
 fn seeds_are_results_of_one_row() {
     let at = folder();
-    let words = [
-        "compare",
-        "builtin:torus",
-        "builtin:capsule",
-        "--methods",
-        "coverage-axis,qmat",
-        "--spheres",
-        "12",
-    ];
-    done(&[&words[..], &["--counts-only", "--seeds", "3", "--out", &at("report")]].concat());
+    let line = "compare builtin:torus builtin:capsule --methods coverage-axis,qmat --spheres 12 --counts-only \
+                --seeds 3 --out";
+    done(&[&words(line)[..], &[&at("report")]].concat());
     let of = |method: &str| {
         let all =
             records(at("report")).into_iter().filter(move |r| r["simplify"]["method"] == method);

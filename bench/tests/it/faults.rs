@@ -235,19 +235,9 @@ fn only_the_tree_of_the_worker_ends_with_it() {
 fn a_program_ends_with_the_command_that_is_terminated() {
     let at = folder();
     let file = plugins(&at, &[("p-waits", "sleep 6543")]);
-    let line = [
-        "simplify",
-        "builtin:box:8",
-        "-m",
-        "p-waits",
-        "--spheres",
-        "20",
-        "--json",
-        "--plugins",
-        &file,
-    ];
+    let line = format!("simplify builtin:box:8 -m p-waits --spheres 20 --json --plugins {file}");
     let mut command = Command::new(MEDIAL);
-    let mut child = command.args(line).stdout(Stdio::null()).spawn().expect("it starts");
+    let mut child = command.args(words(&line)).stdout(Stdio::null()).spawn().expect("it starts");
     while processes_with("sleep 6543").is_empty() && child.try_wait().expect("state").is_none() {
         std::thread::sleep(std::time::Duration::from_millis(5));
     }

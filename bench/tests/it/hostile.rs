@@ -209,7 +209,7 @@ fn artifacts_that_lead_out_of_a_store_are_not_followed() {
         serde_json::from_str(text.lines().next().expect("a line")).expect("JSON");
     let inside = record["artifact"].as_str().expect("a medial mesh").to_owned();
     fs::copy(at(&format!("store/{inside}")), at("outside.ma")).expect("copied");
-    for artifact in ["../outside.ma", &at("outside.ma")] {
+    for artifact in ["../outside.ma", "axes/../../outside.ma", &at("outside.ma"), "study.toml"] {
         record["artifact"] = artifact.into();
         fs::write(&results, format!("{record}\n")).expect("written");
         let (code, object) = json(&["report", &store]);

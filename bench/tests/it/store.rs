@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use crate::command::{
     MEDIAL, done, ended, faulty, folder, json, json_of, records, refused, run, run_program,
-    text_path as text, without_timings,
+    text_path as text, without_timings, words,
 };
 
 /// `compare` with `--json`: the exit code and the object.
@@ -230,22 +230,7 @@ fn the_study_is_written_next_to_its_results() {
     assert_eq!(run_and_found(&compare(&again, &out).1), (0, 6));
     let fewer = [&again[..], &["--methods", "qmat", "--spheres", "30,20"]].concat();
     assert_eq!(run_and_found(&compare(&fewer, &out).1), (1, 1));
-
-    for (wrong, part) in [
-        ("spheres = [3]\nsphere = [4]\n", "line 2"),
-        ("spheres = [-3]\n", "line 1"),
-        ("timeout = 0\n", "--timeout 0"),
-        ("threads = 0\n", "--threads 0"),
-        ("[[method]]\nid = \"qmad\"\n", "did you mean `qmat`"),
-        ("[[method]]\nname = \"x\"\n", "id"),
-        ("meshes = [\"nowhere.off\"]\n", "nowhere.off"),
-        ("plugins = [\"nowhere.toml\"]\n", "nowhere.toml"),
-    ] {
-        fs::write(&file, wrong).expect("written");
-        let (code, _, why) = run(&["compare", "--study", text(&file), "--out", text(&out)]);
-        assert!([1, 2].contains(&code) && why.contains(part), "{wrong}: {why}");
-    }
-    assert_eq!(records(&out).len(), 7, "nothing was lost");
+    assert_eq!(records(&out).len(), 7);
 }
 
 #[test]
@@ -315,16 +300,7 @@ fn a_used_budget_skips_further_levels() {
 #[test]
 fn progress_is_a_line_for_each_mesh_and_method() {
     let at = folder();
-    let words = [
-        "compare",
-        "builtin:box:8",
-        "--methods",
-        "pmat,qmat",
-        "--spheres",
-        "30,20",
-        "--samples",
-        "100",
-    ];
+    let words = words("compare builtin:box:8 --methods pmat,qmat --spheres 30,20 --samples 100");
     let more = ["--repeat", "2", "--counts-only", "--out", &at("out")];
     let (_, _, stderr) = run(&[&words[..], &more].concat());
     let lines: Vec<&str> = stderr.lines().collect();
@@ -435,11 +411,6 @@ fn nothing_outside_of_a_store_is_written_copied_or_removed() {
     }
     let artifact = records(&out)[0]["artifact"].as_str().expect("a name").to_owned();
     let text = fs::read_to_string(&path).expect("results");
-    for (all, elsewhere) in [("1", &*mine), ("2", "axes/../../mine.ma"), ("3", "study.toml")] {
-        fs::write(&path, text.replace(&artifact, elsewhere)).expect("written");
-        let (_, object) = json(&["report", &out, "--out", &at(all)]);
-        assert!(object["warnings"].to_string().contains("missing or not inside"), "{object}");
-    }
     // The folder itself may be a link.
     std::os::unix::fs::symlink(&out, at("link")).expect("linked");
     fs::write(&path, text.replace(&artifact, "axes/../../mine.ma")).expect("written");
