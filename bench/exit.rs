@@ -4,9 +4,8 @@ use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
 
-use medial_run::axis::AxisError;
+use medial_run::error::FileError;
 use medial_run::input::InputError;
-use medial_run::journal::JournalError;
 use medial_run::library::PublicError;
 
 /// Exit codes of the command.
@@ -68,14 +67,8 @@ impl Failure {
     }
 }
 
-impl From<JournalError> for Failure {
-    fn from(error: JournalError) -> Self {
-        Self::input(error)
-    }
-}
-
-impl From<AxisError> for Failure {
-    fn from(error: AxisError) -> Self {
+impl From<FileError> for Failure {
+    fn from(error: FileError) -> Self {
         Self::input(error)
     }
 }

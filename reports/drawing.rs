@@ -295,12 +295,9 @@ impl Deviation {
         tolerance: f64,
     ) -> Result<Self, DrawError> {
         let made = union_surface(axis, tolerance).map_err(|error| {
-            let error = ReconstructError::of_contour(error, 1.0, TOLERANCE);
-            let is_option = matches!(
-                error,
-                ReconstructError::TooFine { .. } | ReconstructError::TooThin { .. }
-            );
-            DrawError { axis: Some(name.to_owned()), is_option, message: error.to_string() }
+            let ReconstructError { is_tolerance, message } =
+                ReconstructError::of_contour(error, 1.0, TOLERANCE);
+            DrawError { axis: Some(name.to_owned()), is_option: is_tolerance, message }
         });
         let mesh = made?.mesh;
         let tree = shape.surface_tree().map_err(DrawError::input)?;

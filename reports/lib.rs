@@ -28,7 +28,6 @@ pub mod diff;
 mod differences;
 pub mod drawing;
 pub mod editions;
-mod error;
 mod header;
 pub mod history;
 mod metric;
@@ -44,7 +43,6 @@ mod tables;
 mod view3d;
 mod write;
 
-pub use error::ReportError;
 pub use header::{Header, MethodNote, RunNote, Running};
 pub use metric::{Better, METRICS, Metric, measured_rows};
 pub use overview::{reasons, summary_text};

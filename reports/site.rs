@@ -11,7 +11,7 @@ use medial_run::text::{escape_html, file_stems, grouped};
 
 use crate::comparison::{Comparison, Entry, reached};
 use crate::differences::against_others;
-use crate::error::ReportError;
+use medial_run::error::FileError;
 use crate::header::{Header, MethodNote, method_pages};
 use crate::metric::{HAUSDORFF, MEAN_ERROR, MIN_ANGLE, TOTAL_SECONDS};
 use crate::pictures::strips;
@@ -28,7 +28,7 @@ pub fn write_site(
     store: &Path,
     records: &[Record],
     header: &Header,
-) -> Result<Vec<PathBuf>, ReportError> {
+) -> Result<Vec<PathBuf>, FileError> {
     let comparison = Comparison::new(records);
     let pictures = strips(&comparison);
     let mut files = Files { dir, written: vec![] };

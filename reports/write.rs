@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use medial::{parser_message, read_regular};
+use medial_run::error::FileError;
 use medial_run::journal::replace_file;
 use medial_run::record::Record;
 use medial_run::text::file_stems;
@@ -14,7 +15,6 @@ use medial_run::text::file_stems;
 use crate::answers::{by_bound, equal_error_table, purpose_table};
 use crate::comparison::Comparison;
 use crate::differences::{difference_tables, differences_csv};
-use crate::error::ReportError;
 use crate::header::Header;
 use crate::overview::overview_table;
 use crate::page::{MeshPart, MeshView, Page, gzip};
@@ -37,19 +37,19 @@ use crate::view3d::text_of;
 /// nothing was measured; the caller sets the exit code.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written, or a plot or the CSV cannot be made.
+/// When a file cannot be written, or a CSV cannot be made.
 pub fn write_report(
     dir: &Path,
     records: &[Record],
     header: &Header,
-) -> Result<Vec<PathBuf>, ReportError> {
+) -> Result<Vec<PathBuf>, FileError> {
     let comparison = Comparison::new(records);
     let is_one = comparison.meshes.len() == 1;
     let (summaries, bounds) = (by_count(&comparison), by_bound(&comparison));
     let natives = native_curves(&comparison);
     let how = header.how();
     let mut files = Files { dir, written: Vec::new() };
-    let csv = to_csv(&comparison).map_err(|error| ReportError::content("results.csv", error))?;
+    let csv = to_csv(&comparison).map_err(|error| FileError::at("results.csv", error))?;
     // Nobody keeps a site for its CSV.
     match header.is_site {
         true => files.write("results.csv.gz", &gzip(&csv))?,
@@ -90,7 +90,7 @@ pub fn write_report(
             ("tables/overview-profiles.csv", profiles_csv(&profiles)),
         ];
         for (name, csv) in csvs {
-            files.write(name, &csv.map_err(|error| ReportError::content(name, error))?)?;
+            files.write(name, &csv.map_err(|error| FileError::at(name, error))?)?;
         }
     }
     let mut figures = mean_figures(&comparison, &summaries, &natives);
@@ -123,8 +123,8 @@ pub fn write_report(
     if !comparison.entries.is_empty() {
         files.write(BIBTEX, bibtex.as_bytes())?;
     }
-    let header_json = serde_json::to_vec_pretty(header)
-        .map_err(|error| ReportError::content("header.json", error))?;
+    let header_json =
+        serde_json::to_vec_pretty(header).map_err(|error| FileError::at("header.json", error))?;
     files.write("header.json", &header_json)?;
     let shown = pictures.values().flat_map(|strip| [strip.file.clone(), strip.view_file()]);
     files.remove_stale(&shown.map(|file| dir.join(file)).collect::<Vec<_>>())?;
@@ -198,22 +198,22 @@ fn view(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option<Me
 /// The content of `results.csv` for some records.
 ///
 /// # Errors
-/// [`ReportError::Content`] when the CSV cannot be made.
-pub fn results_csv(records: &[Record]) -> Result<Vec<u8>, ReportError> {
-    to_csv(&Comparison::new(records)).map_err(|error| ReportError::content("results.csv", error))
+/// When the CSV cannot be made.
+pub fn results_csv(records: &[Record]) -> Result<Vec<u8>, FileError> {
+    to_csv(&Comparison::new(records)).map_err(|error| FileError::at("results.csv", error))
 }
 
 /// Reads the header that [`write_report`] left in a folder, to rebuild its report.
 ///
 /// # Errors
-/// [`ReportError::Io`] when the file is missing or is no header.
-pub fn read_header(dir: &Path) -> Result<Header, ReportError> {
+/// When the file is missing or is no header.
+pub fn read_header(dir: &Path) -> Result<Header, FileError> {
     let path = dir.join("header.json");
     let read = |bytes: Vec<u8>| {
         let header = serde_json::from_slice(&bytes);
         header.map_err(|error| io::Error::other(parser_message(&error.to_string())))
     };
-    read_regular(&path).and_then(read).map_err(|source| ReportError::Io { path, source })
+    read_regular(&path).and_then(read).map_err(|error| FileError::at(&path, error))
 }
 
 /// The folder of the report and the written files.
@@ -223,15 +223,14 @@ pub(crate) struct Files<'a> {
 }
 
 impl Files<'_> {
-    pub(crate) fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), ReportError> {
+    pub(crate) fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), FileError> {
         let path = self.dir.join(name);
-        replace_file(&path, bytes)
-            .map_err(|source| ReportError::Io { path: path.clone(), source })?;
+        replace_file(&path, bytes).map_err(|error| FileError::at(&path, error))?;
         self.written.push(path); // so that it is not taken for stale
         Ok(())
     }
 
-    fn write_plots(&mut self, figures: &[&Figure]) -> Result<(), ReportError> {
+    fn write_plots(&mut self, figures: &[&Figure]) -> Result<(), FileError> {
         for figure in figures {
             if let Some(svg) = figure.to_svg()? {
                 self.write(&format!("plots/{}.svg", figure.stem), svg.as_bytes())?;
@@ -241,12 +240,7 @@ impl Files<'_> {
     }
 
     /// The same tables as Markdown and as LaTeX.
-    fn write_tables(
-        &mut self,
-        stem: &str,
-        title: &str,
-        tables: &[Table],
-    ) -> Result<(), ReportError> {
+    fn write_tables(&mut self, stem: &str, title: &str, tables: &[Table]) -> Result<(), FileError> {
         let mut markdown = format!("# {}\n\n", crate::tables::escape(title));
         let mut latex = String::new();
         for (index, table) in tables.iter().enumerate() {
@@ -264,10 +258,10 @@ impl Files<'_> {
 
     /// Removes files of an earlier report, by names that only a report gives.
     /// The pictures and views that are `shown` stay.
-    fn remove_stale(&self, shown: &[PathBuf]) -> Result<(), ReportError> {
+    fn remove_stale(&self, shown: &[PathBuf]) -> Result<(), FileError> {
         for folder in ["tables", "plots", FOLDER, VIEWS] {
             let folder = self.dir.join(folder);
-            let failed = |source| ReportError::Io { path: folder.clone(), source };
+            let failed = |error| FileError::at(&folder, error);
             let entries = match fs::read_dir(&folder) {
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
                 entries => entries.map_err(failed)?,

@@ -11,6 +11,7 @@ use medial::shape::{Fit, Shape, ShapeError};
 use medial::surface::{self, Side};
 use serde::{Deserialize, Serialize};
 
+use crate::error::FileError;
 use crate::text::percent;
 
 /// Plausible extents of a medial mesh from the middle of its surface, in diagonals.
@@ -74,11 +75,6 @@ pub enum FitBy {
     Auto,
 }
 
-/// The reason for which a file has no medial mesh for a surface, with its name.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct AxisError(String);
-
 /// Reads a medial mesh of a shape in input units, and the requested change of units.
 ///
 /// # Errors
@@ -87,11 +83,11 @@ pub fn read_axis(
     path: &Path,
     shape: &Shape,
     options: AxisOptions,
-) -> Result<(LoadedMa, Option<Fit>), AxisError> {
-    let named = |why: &dyn Display| AxisError(format!("{}: {why}", path.display()));
+) -> Result<(LoadedMa, Option<Fit>), FileError> {
+    let named = |why: &dyn Display| FileError::at(path, why);
     let from_surface = options.radii == RadiiFrom::Surface;
-    let bytes = content(path).map_err(AxisError)?;
-    let mut loaded = read_external(path, &bytes, options.read_options()).map_err(AxisError)?;
+    let bytes = content(path).map_err(FileError)?;
+    let mut loaded = read_external(path, &bytes, options.read_options()).map_err(FileError)?;
     if loaded.mesh.spheres.is_empty() {
         return Err(named(&"no sphere"));
     }

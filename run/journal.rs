@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use medial::{check_regular, parser_message, read_regular, write_atomically};
 
+use crate::error::FileError;
 use crate::record::Record;
 
 /// An open `results.jsonl` that records are added to.
@@ -24,27 +25,26 @@ impl Journal {
     /// line break, so that it spoils no record but itself.
     ///
     /// # Errors
-    /// [`JournalError::Io`] when the file cannot be opened, read or written.
-    pub fn open(path: impl Into<PathBuf>) -> Result<Self, JournalError> {
+    /// When the file cannot be opened, read or written.
+    pub fn open(path: impl Into<PathBuf>) -> Result<Self, FileError> {
         let path = path.into();
         match open_for_lines(&path) {
             Ok(file) => Ok(Self { file, path }),
-            Err(source) => Err(JournalError::Io { path, source }),
+            Err(error) => Err(FileError::at(&path, error)),
         }
     }
 
     /// Adds records in one piece, and waits until they are on the disk.
     ///
     /// # Errors
-    /// [`JournalError::Unreadable`] when a record holds a number that JSON cannot carry (not
-    /// finite); nothing is written then. [`JournalError::Io`] when writing fails.
-    pub fn append(&mut self, records: &[Record]) -> Result<(), JournalError> {
+    /// When a record holds a number that JSON cannot carry (not finite), without writing anything, or when writing fails.
+    pub fn append(&mut self, records: &[Record]) -> Result<(), FileError> {
         let lines: String = records.iter().map(to_line).collect::<Result<_, _>>()?;
         // One call, so that lines of two processes do not mix.
         self.file
             .write_all(lines.as_bytes())
             .and_then(|()| self.file.sync_data())
-            .map_err(|source| JournalError::Io { path: self.path.clone(), source })
+            .map_err(|error| FileError::at(&self.path, error))
     }
 }
 
@@ -96,10 +96,9 @@ impl std::fmt::Display for BadLine {
 /// Reads every record of a `results.jsonl`. Other lines are returned as [`BadLine`]s, empty lines are skipped.
 ///
 /// # Errors
-/// [`JournalError::Io`] when the file cannot be read.
-pub fn read_records(path: &Path) -> Result<Journaled, JournalError> {
-    let bytes =
-        read_regular(path).map_err(|source| JournalError::Io { path: path.to_owned(), source })?;
+/// When the file cannot be read.
+pub fn read_records(path: &Path) -> Result<Journaled, FileError> {
+    let bytes = read_regular(path).map_err(|error| FileError::at(path, error))?;
     Ok(parse_records(&bytes))
 }
 
@@ -126,10 +125,9 @@ pub fn parse_records(bytes: &[u8]) -> Journaled {
 ///
 /// # Errors
 /// As [`Journal::append`].
-pub fn write_records(path: &Path, records: &[Record]) -> Result<(), JournalError> {
+pub fn write_records(path: &Path, records: &[Record]) -> Result<(), FileError> {
     let text = records.iter().map(to_line).collect::<Result<String, _>>()?;
-    replace_file(path, text.as_bytes())
-        .map_err(|source| JournalError::Io { path: path.to_owned(), source })
+    replace_file(path, text.as_bytes()).map_err(|error| FileError::at(path, error))
 }
 
 /// Replaces a file as a whole: a reader sees the old bytes or the new ones, never a part.
@@ -142,7 +140,7 @@ pub fn replace_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
 
 /// One line with its line break. JSON has no infinity and no NaN and serde writes `null` for
 /// them, which no reader accepts: such a record is rejected here.
-pub fn to_line(record: &Record) -> Result<String, JournalError> {
+pub fn to_line(record: &Record) -> Result<String, FileError> {
     let written = serde_json::to_string(record).and_then(|line| {
         let back: Record = serde_json::from_str(&line)?;
         Ok((line, back == *record))
@@ -152,29 +150,6 @@ pub fn to_line(record: &Record) -> Result<String, JournalError> {
         Ok((_, false)) => "a number is not finite".to_owned(),
         Err(error) => error.to_string(),
     };
-    let (mesh, method) = (record.mesh.clone(), record.simplify.method.clone());
-    Err(JournalError::Unreadable { mesh, method, message })
-}
-
-/// Why a `results.jsonl` could not be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum JournalError {
-    /// Reading or writing failed.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The system's message.
-        source: io::Error,
-    },
-    /// The record would not read back as it was.
-    #[error("{method} on {mesh}: the record has no JSON form ({message})")]
-    Unreadable {
-        /// Mesh of the record.
-        mesh: String,
-        /// Method of the record.
-        method: String,
-        /// The cause.
-        message: String,
-    },
+    let (mesh, method) = (&record.mesh, &record.simplify.method);
+    Err(FileError(format!("{method} on {mesh}: the record has no JSON form ({message})")))
 }

@@ -13,6 +13,7 @@
 //! | [`hash`], [`text`] | hashes, numbers and names as text |
 
 pub mod axis;
+pub mod error;
 pub mod evaluate;
 pub mod hash;
 pub mod input;

@@ -1,10 +1,8 @@
 //! A surface from a medial mesh: the boundary of its union, or the power crust.
 
 use medial::Vec3;
-use medial::complex::{
-    ContourError, MedialMesh, MedialUnion, UnionError, UnionSurface, union_surface,
-};
-use medial::geometry::{PowerCrust, TriangulationError};
+use medial::complex::{ContourError, MedialMesh, MedialUnion, UnionSurface, union_surface};
+use medial::geometry::PowerCrust;
 use medial::metrics::union_betti;
 use medial::shape::{Shape, ShapeError};
 use medial::surface::{self, Normalisation, SurfaceReport, TriMesh};
@@ -62,64 +60,39 @@ pub enum Figures {
 
 /// The reason for which there is no surface.
 #[derive(Debug, thiserror::Error)]
-pub enum ReconstructError {
-    /// The medial mesh has no union.
-    #[error(transparent)]
-    Union(#[from] UnionError),
-    /// The spheres give no unit for the tolerance.
-    #[error("the extent of the spheres is zero or not finite")]
-    NoExtent,
-    /// The grid would take too much memory. Tolerances are fractions of the diagonal.
-    #[error(
-        "tolerance {} is too fine (more than {most} tetrahedra); give a tolerance of {feasible:.1e}",
-        significant(*tolerance, 4)
-    )]
-    TooFine {
-        /// The requested tolerance.
-        tolerance: f64,
-        /// Limit of tetrahedra.
-        most: usize,
-        /// A tolerance to try.
-        feasible: f64,
-    },
-    /// No sphere shows at this tolerance.
-    #[error(
-        "every sphere is too thin for this tolerance; give a tolerance of {feasible:.1e} for the largest"
-    )]
-    TooThin {
-        /// A tolerance that shows the largest sphere.
-        feasible: f64,
-    },
-    /// Another error of the contour.
-    #[error(transparent)]
-    Contour(ContourError),
-    /// The surface has no poles.
-    #[error(transparent)]
-    Shape(#[from] ShapeError),
-    /// The balls have no power diagram.
-    #[error(transparent)]
-    Triangulation(#[from] TriangulationError),
-    /// No inner ball has a cell.
-    #[error("no inner ball has a power cell; check surface and units of the medial mesh")]
-    NoCell,
+#[error("{message}")]
+pub struct ReconstructError {
+    /// Whether the tolerance is wrong, rather than the input.
+    pub is_tolerance: bool,
+    /// One line.
+    pub message: String,
 }
 
 impl ReconstructError {
+    fn input(error: impl ToString) -> Self {
+        Self { is_tolerance: false, message: error.to_string() }
+    }
+
     /// An error of the contour, with tolerances as fractions of the diagonal. A feasible tolerance can be much larger
     /// than necessary, so `usual` comes first.
     pub fn of_contour(error: ContourError, diagonal: f64, usual: f64) -> Self {
-        match error {
+        let message = match error {
             ContourError::TooFine { tolerance, most, feasible } => {
                 let tolerance = tolerance / diagonal;
                 let first = if tolerance < usual { usual } else { 1.0 };
-                Self::TooFine { tolerance, most, feasible: (feasible / diagonal).min(first) }
+                format!(
+                    "tolerance {} is too fine (more than {most} tetrahedra); give a tolerance of {:.1e}",
+                    significant(tolerance, 4),
+                    (feasible / diagonal).min(first)
+                )
             }
-            ContourError::TooThin { feasible, .. } => {
-                Self::TooThin { feasible: feasible / diagonal }
-            }
-            ContourError::Union(error) => Self::Union(error),
-            other => Self::Contour(other),
-        }
+            ContourError::TooThin { feasible, .. } => format!(
+                "every sphere is too thin for this tolerance; give a tolerance of {:.1e} for the largest",
+                feasible / diagonal
+            ),
+            other => return Self::input(other),
+        };
+        Self { is_tolerance: true, message }
     }
 }
 
@@ -134,18 +107,19 @@ pub fn power_crust(
     shape: &Shape,
     axis: Option<&MedialMesh>,
 ) -> Result<Reconstruction, ReconstructError> {
-    let balls = shape.polar_balls()?;
+    let balls = shape.polar_balls().map_err(ReconstructError::input)?;
     let units = shape.normalisation();
     let inner = match axis {
         Some(axis) => axis.to_normal(units).spheres,
         None => balls.inner,
     };
-    let crust = PowerCrust::new(&inner, &balls.outer)?;
+    let crust = PowerCrust::new(&inner, &balls.outer).map_err(ReconstructError::input)?;
     let facets = crust.facet_count();
     let mut crust = surface::crust_surface(&crust, COINCIDENT);
     // A medial mesh in other units lies outside of all cells.
     if crust.mesh.faces.is_empty() {
-        return Err(ReconstructError::NoCell);
+        let why = "no inner ball has a power cell; check surface and units of the medial mesh";
+        return Err(ReconstructError::input(why));
     }
     crust.mesh.vertices.iter_mut().for_each(|vertex| *vertex = units.backward(*vertex));
     let figures = Figures::PowerCrust {
@@ -172,11 +146,12 @@ pub fn union_boundary(
     diagonal: Option<f64>,
     tolerance: Option<f64>,
 ) -> Result<Reconstruction, ReconstructError> {
-    let union = MedialUnion::new(axis)?;
+    let union = MedialUnion::new(axis).map_err(ReconstructError::input)?;
     let (low, high) = union.bounding_box();
     let corners = TriMesh { vertices: vec![low, high], faces: vec![] };
     let diagonal = diagonal.or_else(|| Normalisation::of(&corners).map(|units| units.diagonal));
-    let diagonal = diagonal.ok_or(ReconstructError::NoExtent)?;
+    let why = "the extent of the spheres is zero or not finite";
+    let diagonal = diagonal.ok_or_else(|| ReconstructError::input(why))?;
     let fitting = fitting_surface(axis, &union, diagonal, tolerance);
     let Fitting { made, tolerance, off, betti } =
         fitting.map_err(|error| ReconstructError::of_contour(error, diagonal, FINE))?;

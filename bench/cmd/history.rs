@@ -35,7 +35,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let Arguments { folder, least_step, .. } = arguments;
     let (added, mut warnings) = add(arguments)?;
-    let (runs, damaged) = read_runs(folder).map_err(Failure::input)?;
+    let (runs, damaged) = read_runs(folder)?;
     warnings.extend(damaged.iter().map(|error| format!("skipped: {error}")));
     if runs.is_empty() {
         let why = warnings.first().map_or("no runs; add one by --add".to_owned(), Clone::clone);
@@ -62,10 +62,10 @@ fn add(arguments: &Arguments) -> Result<(Option<PathBuf>, Vec<String>), Failure>
         return Ok((None, vec![]));
     };
     let path = store.join(RESULTS);
-    let journaled = read_records(&path).map_err(Failure::input)?;
+    let journaled = read_records(&path)?;
     let warnings = journaled.bad_lines.iter().map(|line| format!("{}: {line}", path.display()));
     let run = Run::of_records(&journaled.records, commit, date)
         .map_err(|error| Failure::input(format!("{}: {error}", store.display())))?;
-    let (file, is_new) = run.add_to(folder).map_err(Failure::input)?;
+    let (file, is_new) = run.add_to(folder)?;
     Ok((is_new.then_some(file), warnings.collect()))
 }

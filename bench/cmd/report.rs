@@ -188,7 +188,7 @@ fn merge(dirs: &[PathBuf], out: &Path) -> Result<Vec<String>, Failure> {
         write_study(out, study)?;
     }
     let records: Vec<Record> = merged.into_iter().map(|(record, ..)| record).collect();
-    write_records(&out.join(RESULTS), &records).map_err(Failure::input)?;
+    write_records(&out.join(RESULTS), &records)?;
     let mut header = Header::default();
     for dir in earlier.iter().chain(dirs) {
         let Ok(Header { runs, methods, .. }) = read_header(dir) else { continue };
@@ -280,7 +280,7 @@ fn freeze(dir: &Path, records: &[Record], to: &Path, registry: &Registry) -> Res
         record.artifact = record.artifact.take().filter(|artifact| kept.contains(artifact));
     }
     let machines: BTreeSet<String> = frozen.iter().map(|r| r.machine.to_string()).collect();
-    let packed = editions::pack(&frozen).map_err(Failure::input)?;
+    let packed = editions::pack(&frozen)?;
     let mut spheres = study.spheres;
     spheres.sort_unstable_by(|a, b| b.cmp(a));
     let name = to.file_name().unwrap_or_default().to_string_lossy().into_owned();

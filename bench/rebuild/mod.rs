@@ -144,7 +144,7 @@ fn write(
     // Pictures of inputs that can no longer be read stay unchanged.
     let undrawn =
         if draws { pictures::draw([dir, dir], &shown, &sources(dir)) } else { Vec::new() };
-    let files = write_report(dir, &shown, &header).map_err(Failure::input)?;
+    let files = write_report(dir, &shown, &header)?;
     Ok(Rebuilt { records, files, warnings, undrawn })
 }
 
@@ -198,7 +198,7 @@ pub fn write_study(dir: &Path, study: &Study) -> Result<(), Failure> {
 /// The records of a store or of a file, and warnings about lines without a record. Fails when the file cannot be read.
 pub fn records(path: &Path) -> Result<(Vec<Record>, Vec<String>), Failure> {
     let file = if path.is_dir() { path.join(RESULTS) } else { path.to_owned() };
-    let journaled = read_records(&file).map_err(Failure::input)?;
+    let journaled = read_records(&file)?;
     let warnings = journaled.bad_lines.iter().map(ToString::to_string).collect();
     Ok((journaled.records, warnings))
 }

@@ -6,7 +6,7 @@
 use std::io::{self, Read};
 
 use flate2::read::GzDecoder;
-use medial_run::journal::JournalError;
+use medial_run::error::FileError;
 use medial_run::journal::{Journaled, parse_records, to_line};
 use medial_run::record::Record;
 
@@ -40,7 +40,7 @@ pub const EDITIONS: &[Embedded] = &[Embedded {
 ///
 /// # Errors
 /// When a record has no JSON form.
-pub fn pack(records: &[Record]) -> Result<Vec<u8>, JournalError> {
+pub fn pack(records: &[Record]) -> Result<Vec<u8>, FileError> {
     let text = records.iter().map(to_line).collect::<Result<String, _>>()?;
     Ok(gzip(text.as_bytes()))
 }

@@ -17,7 +17,7 @@ use serde::Serialize;
 use serde_json::json;
 
 pub use change_points::{ChangePoint, change_points};
-pub use run::{HistoryError, Point, Run, read_runs};
+pub use run::{Point, Run, read_runs};
 
 use crate::diff::results::compare;
 use crate::diff::text::headline;

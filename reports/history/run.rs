@@ -4,11 +4,11 @@
 //! and never replaced.
 
 use std::collections::BTreeMap;
-use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use medial::{parser_message, read_regular_text};
+use medial_run::error::FileError;
 use medial_run::journal::replace_file;
 use medial_run::record::{Machine, Record, Stages, Status};
 use medial_run::text::printable;
@@ -18,17 +18,6 @@ use serde_json::Value;
 use crate::comparison::row_name;
 use crate::diff::results::{Facts, expected_betti, gates};
 use crate::metric::median;
-
-/// Why a run cannot be stored, or a history cannot be read: the file or option, and its problem.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct HistoryError(String);
-
-impl HistoryError {
-    fn file(path: &Path, message: impl Display) -> Self {
-        Self(format!("{}: {message}", path.display()))
-    }
-}
 
 /// The measurements of one build in one study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -78,8 +67,8 @@ impl Run {
     ///
     /// # Errors
     /// When there is no record, the records are of several machines or studies, or commit or date are malformed.
-    pub fn of_records(records: &[Record], commit: &str, date: &str) -> Result<Self, HistoryError> {
-        let invalid = |message: String| Err(HistoryError(message));
+    pub fn of_records(records: &[Record], commit: &str, date: &str) -> Result<Self, FileError> {
+        let invalid = |message: String| Err(FileError(message));
         if !(8..=64).contains(&commit.len()) || !commit.bytes().all(|b| b.is_ascii_hexdigit()) {
             return invalid(format!("--commit {commit}: expected 8 to 64 hexadecimal digits"));
         }
@@ -135,16 +124,16 @@ impl Run {
     ///
     /// # Errors
     /// When the folder cannot be written, or has another run of this date and commit.
-    pub fn add_to(&self, folder: &Path) -> Result<(PathBuf, bool), HistoryError> {
+    pub fn add_to(&self, folder: &Path) -> Result<(PathBuf, bool), FileError> {
         let path = folder.join(self.file_name());
-        let failed = |error: io::Error| HistoryError::file(&path, error);
+        let failed = |error: io::Error| FileError::at(&path, error);
         let text = serde_json::to_string(self).map_err(|error| failed(error.into()))? + "\n";
         match read_regular_text(&path) {
             Ok(old) if old == text => return Ok((path, false)),
             Ok(_) => {
                 let message =
                     "this run is already stored with other content; remove the file to replace it";
-                return Err(HistoryError::file(&path, message));
+                return Err(FileError::at(&path, message));
             }
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(failed(error)),
             Err(_) => {}
@@ -153,16 +142,16 @@ impl Run {
         Ok((path, true))
     }
 
-    fn read(path: &Path) -> Result<Self, HistoryError> {
-        let text = read_regular_text(path).map_err(|error| HistoryError::file(path, error))?;
+    fn read(path: &Path) -> Result<Self, FileError> {
+        let text = read_regular_text(path).map_err(|error| FileError::at(path, error))?;
         let run: Self = serde_json::from_str(&text)
-            .map_err(|error| HistoryError::file(path, parser_message(&error.to_string())))?;
+            .map_err(|error| FileError::at(path, parser_message(&error.to_string())))?;
         let Self { date, commit, .. } = &run;
         // Long enough to have a file name.
         let is_named = date.len() >= 10 && commit.len() >= 8;
         match is_named && path.file_name().is_some_and(|name| *name == *run.file_name()) {
             true => Ok(run),
-            false => Err(HistoryError::file(path, "date and commit do not match the file name")),
+            false => Err(FileError::at(path, "date and commit do not match the file name")),
         }
     }
 }
@@ -171,9 +160,9 @@ impl Run {
 ///
 /// # Errors
 /// When the folder cannot be listed.
-pub fn read_runs(folder: &Path) -> Result<(Vec<Run>, Vec<HistoryError>), HistoryError> {
+pub fn read_runs(folder: &Path) -> Result<(Vec<Run>, Vec<FileError>), FileError> {
     let entries = fs::read_dir(folder).and_then(|entries| entries.collect::<io::Result<Vec<_>>>());
-    let entries = entries.map_err(|error| HistoryError::file(folder, error))?;
+    let entries = entries.map_err(|error| FileError::at(folder, error))?;
     let mut paths: Vec<PathBuf> = entries.iter().map(fs::DirEntry::path).collect();
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "json"));
     paths.sort();

@@ -14,7 +14,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::axis::{Axis, Scale};
 use super::{Curve, Figure, Point};
-use crate::error::ReportError;
+use medial_run::error::FileError;
 
 /// The backend draws at whole pixels: a large drawing keeps circles and slopes smooth at any size.
 const WIDTH: i32 = 1280;
@@ -74,7 +74,7 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 impl Figure {
     /// The figure as SVG; `None` where there is no point to draw.
-    pub(crate) fn to_svg(&self) -> Result<Option<String>, ReportError> {
+    pub(crate) fn to_svg(&self) -> Result<Option<String>, FileError> {
         let points: Vec<&Point> = self.curves.iter().flat_map(|curve| &curve.points).collect();
         let x = Axis::fit(Scale::Log, points.iter().map(|point| point.x));
         let bars = points.iter().flat_map(|point| point.bar.into_iter().flatten());
@@ -84,7 +84,7 @@ impl Figure {
         let size = (WIDTH as u32, HEIGHT.max(rows as i32 * LEGEND_ROW + 120) as u32);
         let mut svg = String::new();
         self.draw(x, y, &SVGBackend::with_string(&mut svg, size).into_drawing_area())
-            .map_err(|error| ReportError::content("a plot", format!("plot: {error}")))?;
+            .map_err(|error| FileError(format!("plot: {error}")))?;
         Ok(Some(svg))
     }
 
