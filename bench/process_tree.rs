@@ -190,26 +190,25 @@ fn pid_of(pid: u32) -> Option<rustix::process::Pid> {
     rustix::process::Pid::from_raw(i32::try_from(pid).ok()?)
 }
 
-/// Name and usual cause of a signal. Numbers that are not listed differ between systems.
-pub fn signal_name(signal: i32) -> String {
-    let name = match signal {
-        1 => "SIGHUP",
-        2 => "SIGINT",
-        3 => "SIGQUIT",
-        4 => "SIGILL (illegal instruction)",
-        5 => "SIGTRAP",
-        6 => "SIGABRT (aborted by itself)",
-        8 => "SIGFPE (arithmetic error)",
-        9 => "SIGKILL (possibly by the system, out of memory)",
-        11 => "SIGSEGV (invalid memory access)",
-        13 => "SIGPIPE",
-        14 => "SIGALRM",
-        15 => "SIGTERM",
-        24 => "SIGXCPU (CPU time limit)",
-        25 => "SIGXFSZ (file size limit)",
-        _ => return format!("signal {signal}"),
-    };
-    name.to_owned()
+/// The signal that ended a process, with its usual cause. Numbers that are not listed differ between systems.
+pub fn ending_signal(status: ExitStatus) -> Option<String> {
+    #[cfg(unix)]
+    let signal = std::os::unix::process::ExitStatusExt::signal(&status)?;
+    #[cfg(not(unix))]
+    let signal = status.code().is_none().then_some(0)?;
+    Some(match signal {
+        1 => "SIGHUP".to_owned(),
+        2 => "SIGINT".to_owned(),
+        4 => "SIGILL (illegal instruction)".to_owned(),
+        6 => "SIGABRT (aborted by itself)".to_owned(),
+        8 => "SIGFPE (arithmetic error)".to_owned(),
+        9 => "SIGKILL (possibly by the system, out of memory)".to_owned(),
+        11 => "SIGSEGV (invalid memory access)".to_owned(),
+        15 => "SIGTERM".to_owned(),
+        24 => "SIGXCPU (CPU time limit)".to_owned(),
+        25 => "SIGXFSZ (file size limit)".to_owned(),
+        _ => format!("signal {signal}"),
+    })
 }
 
 /// The children of a process, as the kernel lists them for each of its threads.

@@ -1,21 +1,26 @@
 //! The origin of a record: machine, program, command line.
 
+use std::borrow::Cow;
 use std::{env, fs, thread};
 
 use medial_run::hash::hex_digest;
 use medial_run::record::{Machine, Provenance};
+use medial_run::text::command_line;
 
 use crate::host::Host;
 
 /// The provenance of the running process.
 pub fn provenance() -> Provenance {
+    let words = Host::here().map(|host| &host.words[..]).unwrap_or_default();
+    let words = words.iter().map(|word| word.to_string_lossy());
     Provenance {
         machine: machine(),
         binary_hash: Host::here()
             .and_then(|host| fs::read(&host.code))
             // A program that cannot be read leaves no hash, and costs no result.
             .map_or_else(|_| String::new(), |bytes| hex_digest(&bytes)),
-        command: command_line(),
+        // With the bare name of the program.
+        command: command_line([Cow::Borrowed("medial")].into_iter().chain(words)),
         version: env!("CARGO_PKG_VERSION").to_owned(),
     }
 }
@@ -45,20 +50,4 @@ fn proc_field(path: &str, key: &str) -> Option<String> {
 
 fn kibibytes(value: &str) -> Option<u64> {
     Some(value.strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
-}
-
-/// The command line with the program's bare name, quoted where a shell would need it.
-fn command_line() -> String {
-    let mut line = "medial".to_owned();
-    for word in Host::here().map(|host| &host.words[..]).unwrap_or_default() {
-        let word = word.to_string_lossy();
-        // No shell gives these characters a meaning.
-        let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
-        if !word.is_empty() && word.chars().all(is_plain) {
-            line = line + " " + &word;
-        } else {
-            line = line + " '" + &word.replace('\'', r"'\''") + "'";
-        }
-    }
-    line
 }

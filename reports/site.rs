@@ -6,12 +6,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use medial_run::error::FileError;
 use medial_run::record::{Record, Status};
 use medial_run::text::{escape_html, file_stems, grouped};
 
 use crate::comparison::{Comparison, Entry, reached};
 use crate::differences::against_others;
-use medial_run::error::FileError;
 use crate::header::{Header, MethodNote, method_pages};
 use crate::metric::{HAUSDORFF, MEAN_ERROR, MIN_ANGLE, TOTAL_SECONDS};
 use crate::pictures::strips;

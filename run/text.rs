@@ -84,6 +84,17 @@ pub fn printable(text: &str) -> String {
         .collect()
 }
 
+/// Words as a command line, quoted where a shell would need it.
+pub fn command_line(words: impl IntoIterator<Item: AsRef<str>>) -> String {
+    // No shell gives these characters a meaning.
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
+    let quoted = |word: &str| match !word.is_empty() && word.chars().all(is_plain) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    };
+    words.into_iter().map(|word| quoted(word.as_ref())).collect::<Vec<_>>().join(" ")
+}
+
 /// Text cut to a number of characters, with an ellipsis where something was cut.
 pub fn shortened(text: &str, limit: usize) -> String {
     if text.chars().count() <= limit {

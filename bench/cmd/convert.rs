@@ -14,7 +14,7 @@ use serde_json::json;
 use crate::args::{Global, MeshArgument};
 use crate::exit::{Exit, Failure};
 use crate::files::{SURFACES, check_apart, check_extension, left_out, open_regular, shape_of};
-use crate::output::{counted, print_json, print_line};
+use crate::output::{counted, print_result};
 
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
@@ -79,18 +79,11 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         notes.extend(loaded.report.warnings);
         (notes, loaded.mesh.vertices.len(), loaded.mesh.faces.len())
     };
-    if global.json {
-        let object = json!({ "output": arguments.to, "vertices": vertices, "faces": faces });
-        print_json(&object, &notes);
-    } else {
-        let [vertices, faces] = [(vertices, "vertex"), (faces, "face")]
-            .map(|(count, noun)| counted(count as u64, noun));
-        print_line(&format!("{}: {vertices}, {faces}", arguments.to.display()));
-        for note in notes {
-            print_line(&format!("  note: {note}"));
-        }
-    }
-    Ok(Exit::Done)
+    let object = json!({ "output": arguments.to, "vertices": vertices, "faces": faces });
+    let [vertices, faces] =
+        [(vertices, "vertex"), (faces, "face")].map(|(count, noun)| counted(count as u64, noun));
+    let text = format!("{}: {vertices}, {faces}", arguments.to.display());
+    Ok(print_result(global, &object, &text, &notes))
 }
 
 /// Whether an extension is written for medial meshes and not for surfaces.

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use crate::args::{Global, positive};
 use crate::exit::{Exit, Failure};
-use crate::output::{print_json, print_line};
+use crate::output::{print_json, print_line, print_result};
 
 /// Arguments of `datasets`.
 #[derive(Debug, Args)]
@@ -69,16 +69,12 @@ fn write(make: &Make, global: &Global) -> Result<Exit, Failure> {
     let mesh = medial_datasets::add_noise(&input.mesh, make.noise, make.seed);
     surface::write(&make.output, &mesh).map_err(Failure::input)?;
     let (vertices, faces) = (mesh.vertices.len(), mesh.faces.len());
-    if global.json {
-        let object = json!({
-            "id": make.id, "output": make.output, "vertices": vertices, "faces": faces,
-            "noise": make.noise, "seed": make.seed,
-        });
-        print_json(&object, &[]);
-    } else {
-        print_line(&format!("{}: {vertices} vertices, {faces} faces", make.output.display()));
-    }
-    Ok(Exit::Done)
+    let object = json!({
+        "id": make.id, "output": make.output, "vertices": vertices, "faces": faces,
+        "noise": make.noise, "seed": make.seed,
+    });
+    let text = format!("{}: {vertices} vertices, {faces} faces", make.output.display());
+    Ok(print_result(global, &object, &text, &[]))
 }
 
 const SCRIPT: &str = include_str!("../../scripts/fetch_meshes.py");

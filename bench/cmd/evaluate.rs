@@ -16,7 +16,7 @@ use serde_json::json;
 use crate::args::{AxisArguments, Global, MeasureArguments, MeshArgument};
 use crate::exit::{Exit, Failure};
 use crate::files::shape_of;
-use crate::output::{counted, note, print_error, print_json, print_line};
+use crate::output::{counted, note, print_error, print_json, print_line, print_result};
 use crate::progress::StageLine;
 use crate::study::edition::Edition;
 use crate::study::registry::Registry;
@@ -95,15 +95,10 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         let row = rows.remove(0)?;
         row.notes.iter().for_each(|line| note(global, line));
         let warnings = [&row.defects[..], warnings].concat();
-        if global.json {
-            print_json(&row, &warnings);
-        } else {
-            print_evaluation(&row.evaluation);
-            row.place.iter().for_each(|place| print_line(&format!("  {place}")));
-            let all = row.evaluation.warnings.iter().chain(&warnings);
-            all.for_each(|warning| print_line(&format!("  warning: {warning}")));
-        }
-        return Ok(Exit::Done);
+        let mut text = described(&row.evaluation);
+        row.place.iter().for_each(|place| text += &format!("\n  {place}"));
+        let all = [&row.evaluation.warnings[..], &warnings].concat();
+        return Ok(print_result(global, &row, &text, &all));
     }
     let refused = rows.iter().filter(|row| row.is_err()).count();
     print_table(&arguments.axes, &rows, warnings, global);
@@ -233,30 +228,31 @@ fn print_table(
     warnings.iter().for_each(|warning| print_line(&format!("warning: {warning}")));
 }
 
-/// Prints every metric, lengths in percent of the diagonal.
-fn print_evaluation(evaluation: &Evaluation) {
+/// Every metric, lengths in percent of the diagonal.
+fn described(evaluation: &Evaluation) -> String {
     let counts = &evaluation.counts;
-    print_line(&format!(
+    let mut text = format!(
         "{}, {} ({} without a face), {}",
         counted(counts.spheres, "sphere"),
         counted(counts.edges, "edge"),
         counts.lone_edges,
         counted(counts.faces, "face")
-    ));
+    );
+    let mut add = |name: &str, value: &str| text += &format!("\n  {name:<32} {value}");
     let betti = match evaluation.expected_betti {
         Some(expected) => format!("{:?} (the solid's: {expected:?})", evaluation.betti),
         None => format!("{:?}", evaluation.betti),
     };
     for (metric, mut values) in measured_rows(&[evaluation]) {
-        print_line(&format!("  {metric:<32} {}", values.remove(0)));
+        add(&metric, &values.remove(0));
     }
-    print_line(&format!("  {:<32} {betti}", "Betti numbers"));
+    add("Betti numbers", &betti);
     if let Some(structure) = &evaluation.structure {
-        print_line(&format!("  {:<32} {}", "structure", structure.graph));
+        add("structure", &structure.graph.to_string());
         if let Some(known) = &structure.known {
             let (matched, missing, spurious) = (known.matched, known.missing, known.spurious);
             let text = format!("{matched} matched, {missing} missing, {spurious} spurious");
-            print_line(&format!("  {:<32} {text}", "sheets compared"));
+            add("sheets compared", &text);
         }
     }
     if let Some(certified) = evaluation.certified {
@@ -266,6 +262,7 @@ fn print_evaluation(evaluation: &Evaluation) {
             WitnessSide::Union => "union",
         };
         let [x, y, z] = point.to_array().map(|x| significant(x, 4));
-        print_line(&format!("  {:<32} on the {on}: {x} {y} {z}", "farthest point"));
+        add("farthest point", &format!("on the {on}: {x} {y} {z}"));
     }
+    text
 }

@@ -19,7 +19,7 @@ use serde_json::json;
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::files;
-use crate::output::{print_json, print_line};
+use crate::output::print_result;
 use crate::provenance::provenance;
 use crate::rebuild::{Rebuilt, STUDY, of_items, rebuild, records, write_site_of, write_study};
 use crate::store::{AXES, PAGE, RESULTS, Store, artifact_path};
@@ -90,15 +90,9 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let keys: HashSet<&str> = records.iter().map(|record| &*record.key).collect();
     let without = records.iter().filter(|record| record.key.is_empty()).count();
     let count = keys.len() + without.saturating_sub(1);
-    if global.json {
-        print_json(&json!({ "records": count, "files": files }), &warnings);
-    } else {
-        for warning in &warnings {
-            print_line(&format!("warning: {warning}"));
-        }
-        print_line(&format!("{count} records; page: {}", page.display()));
-    }
-    Ok(Exit::Done)
+    let object = json!({ "records": count, "files": files });
+    let text = format!("{count} records; page: {}", page.display());
+    Ok(print_result(global, &object, &text, &warnings))
 }
 
 /// Merges stores into `out`: records with their medial meshes, the study, the notes of the runs. Of

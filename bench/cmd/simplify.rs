@@ -18,7 +18,7 @@ use crate::args::{
 };
 use crate::exit::{Exit, Failure};
 use crate::files::{check_apart, check_output, left_out, shape_of};
-use crate::output::{counted, print_json, print_line};
+use crate::output::{counted, print_result};
 use crate::progress::StageLine;
 use crate::study::registry::{DEFAULT, Entry, Registry};
 
@@ -107,19 +107,13 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         warnings.extend(left_out(path, &mesh));
     }
     drop(line);
-    if global.json {
-        let mut object = serde_json::to_value(&simplify).map_err(Failure::input)?;
-        if let Some(search) = &search {
-            object["max_error"] = serde_json::to_value(search).map_err(Failure::input)?;
-        }
-        print_json(&object, &warnings);
-    } else {
-        print_result(&simplify, search.as_ref(), arguments);
-        for warning in simplify.warnings.iter().chain(&warnings) {
-            print_line(&format!("  warning: {warning}"));
-        }
+    let mut object = serde_json::to_value(&simplify).map_err(Failure::input)?;
+    if let Some(search) = &search {
+        object["max_error"] = serde_json::to_value(search).map_err(Failure::input)?;
     }
-    Ok(Exit::Done)
+    let text = described(&simplify, search.as_ref(), arguments);
+    warnings.splice(..0, simplify.warnings);
+    Ok(print_result(global, &object, &text, &warnings))
 }
 
 impl Arguments {
@@ -156,9 +150,10 @@ impl Arguments {
     }
 }
 
-fn print_result(simplify: &Simplify, search: Option<&Searched>, arguments: &Arguments) {
+/// The result in words.
+fn described(simplify: &Simplify, search: Option<&Searched>, arguments: &Arguments) -> String {
     let seconds = simplify.seconds.unwrap_or_default();
-    print_line(&format!(
+    let mut text = format!(
         "{}{}: {}, {}, {}; substrates {:.2} s, prepare {:.2} s, simplify {:.2} s",
         simplify.method,
         if arguments.method.is_none() { " (default)" } else { "" },
@@ -168,9 +163,9 @@ fn print_result(simplify: &Simplify, search: Option<&Searched>, arguments: &Argu
         seconds.substrate,
         seconds.prepare,
         seconds.simplify
-    ));
+    );
     if let Some(level) = simplify.native_level {
-        print_line(&format!("  native level {}", significant(level, 4)));
+        text += &format!("\n  native level {}", significant(level, 4));
     }
     if let Some(search) = search {
         let of = match search.tried {
@@ -178,11 +173,12 @@ fn print_result(simplify: &Simplify, search: Option<&Searched>, arguments: &Argu
             tried => format!(", the fewest spheres of {tried} levels tried"),
         };
         let certified = if search.certified { "at most " } else { "" };
-        print_line(&format!("  Hausdorff error {certified}{}{of}", percent(search.hausdorff)));
+        text += &format!("\n  Hausdorff error {certified}{}{of}", percent(search.hausdorff));
     }
     if let Some(path) = &arguments.output {
-        print_line(&format!("  written: {}", path.display()));
+        text += &format!("\n  written: {}", path.display());
     }
+    text
 }
 
 /// Reads a bound.

@@ -32,7 +32,8 @@ use crate::check::Outcome;
 use crate::exec::protocol::{CheckItem, Event, PROTOCOL, Request};
 use crate::exec::worker::{Worker, WorkerOptions};
 use crate::exit::{Exit, Failure};
-use crate::process_tree::signal_name;
+use crate::plugin::last_line;
+use crate::process_tree::ending_signal;
 
 /// Runs items one after another, in a worker that it replaces when an item has broken it.
 pub struct Supervisor<'a> {
@@ -308,7 +309,6 @@ impl<'a> Supervisor<'a> {
                         return Ok(refused.map_or(Attempt::Finished, Attempt::Refused));
                     }
                     Event::Refused(why) => refused = Some(why),
-                    Event::Loading => {}
                     Event::OutOfMemory => memory_refused = true,
                     Event::Preparing(hash) => {
                         self.input = item.map(|item| (item.scene.clone(), hash));
@@ -477,20 +477,13 @@ fn ended(
 }
 
 fn describe_end(status: ExitStatus) -> String {
-    #[cfg(unix)]
-    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
-        return format!("the process was ended by {}", signal_name(signal));
+    if let Some(signal) = ending_signal(status) {
+        return format!("the process was ended by {signal}");
     }
     match status.code() {
         Some(code) => format!("the process ended with exit code {code}"),
         None => "the process ended".to_owned(),
     }
-}
-
-fn last_line(text: &str) -> Option<String> {
-    let line = text.lines().rev().map(str::trim).find(|line| !line.is_empty())?;
-    // It becomes part of a table cell.
-    Some(line.chars().filter(|c| !c.is_control()).take(200).collect())
 }
 
 /// The interval at which a supervisor checks time and memory.

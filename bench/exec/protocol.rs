@@ -89,8 +89,6 @@ pub struct CheckItem {
 pub enum Event {
     /// The first event of a worker: its [`PROTOCOL`].
     Ready(u32),
-    /// The input is being read and prepared.
-    Loading,
     /// The input is ready, its SHA-256; the method prepares.
     Preparing(String),
     /// The method simplifies to a level, or searches the fewest spheres within a bound.

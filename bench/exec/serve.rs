@@ -20,9 +20,10 @@ use medial_run::hash::mesh_hash;
 use medial_run::input::{Input, Source};
 use medial_run::item::GIVEN;
 use medial_run::item::{Item, MethodSpec};
+use medial_run::journal::to_line;
 use medial_run::outcome::{failure_record, record, repetition};
 use medial_run::record::Provenance;
-use medial_run::record::{Record, Status};
+use medial_run::record::Status;
 use medial_run::scene::{Scene, judge};
 use medial_run::timed::{Bounds, Budget, Fault, LevelRun, answer, panic_message, preparing};
 
@@ -124,7 +125,6 @@ fn run(
     item: &Item,
     report: &mut dyn FnMut(&Scene, Vec<LevelRun>) -> io::Result<()>,
 ) -> io::Result<()> {
-    send(&Event::Loading)?;
     let scene = match enter(scene, item) {
         Ok(scene) => &*scene,
         Err(why) => return send(&Event::Refused(why)),
@@ -184,8 +184,7 @@ fn send_records(
     for (run, evaluation) in runs.iter().zip(judge(scene, runs)) {
         let mut record = record(item, scene, run, evaluation, provenance, axes);
         // JSON has no infinity and no NaN, and writes `null`: reading the record back would change it.
-        let text = serde_json::to_string(&record).unwrap_or_default();
-        if serde_json::from_str::<Record>(&text).map_or(true, |back| back != record) {
+        if to_line(&record).is_err() {
             let reason = "the record has a number that is not finite".to_owned();
             let fault = Fault { status: Status::InvalidOutput, reason };
             record = failure_record(item, run.level, &fault, provenance);

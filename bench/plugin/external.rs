@@ -26,7 +26,7 @@ use tempfile::TempDir;
 
 use super::declaration::{Declaration, LevelKind, OutputUnits, Word};
 use super::program::{self, Ended, NoEnd};
-use crate::process_tree::signal_name;
+use crate::process_tree::ending_signal;
 
 /// Environment variable with the folder of temporary folders.
 pub const SCRATCH: &str = "MEDIAL_SCRATCH";
@@ -370,11 +370,7 @@ fn check_status(id: &str, status: ExitStatus, stderr: &str) -> Result<(), Simpli
         }
         None => {
             let message = message.map_or_else(String::new, |line| format!(": {line}"));
-            #[cfg(unix)]
-            let signal = std::os::unix::process::ExitStatusExt::signal(&status).unwrap_or(0);
-            #[cfg(not(unix))]
-            let signal = 0;
-            let by = signal_name(signal);
+            let by = ending_signal(status).unwrap_or_default();
             Err(SimplifyError::Crashed(format!("{id}: ended by {by}{message}")))
         }
     }
@@ -430,7 +426,7 @@ impl Report {
 }
 
 /// The last line that is not empty, without control characters.
-fn last_line(text: &str) -> Option<String> {
+pub(crate) fn last_line(text: &str) -> Option<String> {
     text.lines().rev().map(clean).find(|line| !line.is_empty())
 }
 

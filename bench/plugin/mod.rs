@@ -32,6 +32,7 @@ mod program;
 
 pub use declaration::PluginError;
 pub(crate) use declaration::{is_id, line_of};
+pub(crate) use external::last_line;
 pub use external::{External, SCRATCH};
 pub(crate) use program::Drain;
 

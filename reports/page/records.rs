@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use medial_run::level::Target;
 use medial_run::record::Record;
-use medial_run::text::significant;
+use medial_run::text::{command_line, significant};
 use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, Entry, level_label, reached};
@@ -125,7 +125,7 @@ fn repeat_command(record: &Record) -> String {
     if simplify.seed != 0 {
         words.extend(["--seed".to_owned(), simplify.seed.to_string()]);
     }
-    words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
+    command_line(&words)
 }
 
 /// The sets whose meshes `dataset:NAME` names.
@@ -155,17 +155,6 @@ fn mesh_name(word: &str) -> Option<String> {
     // A bare word may be a method's name: files have an extension.
     let (stem, _) = word.rsplit('/').next()?.rsplit_once('.')?;
     (!stem.is_empty()).then(|| stem.to_owned())
-}
-
-/// A word as a shell takes it.
-fn quoted(word: &str) -> String {
-    // Words with other characters need single quotes.
-    let is_plain = word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c));
-    if is_plain && !word.is_empty() {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 
 use std::error::Error;
 
+use medial_run::error::FileError;
 use medial_run::text::{printable, shortened};
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -14,7 +15,6 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::axis::{Axis, Scale};
 use super::{Curve, Figure, Point};
-use medial_run::error::FileError;
 
 /// The backend draws at whole pixels: a large drawing keeps circles and slopes smooth at any size.
 const WIDTH: i32 = 1280;

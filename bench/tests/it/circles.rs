@@ -8,42 +8,48 @@ use std::fs;
 use std::path::Path;
 
 /// Names of modules from the root of a crate.
-type Module = Vec<String>;
+pub type Module = Vec<String>;
 
 /// A file: the paths in it, and the names that its `use` declarations bring in.
 #[derive(Default)]
 struct Source {
-    file: String,
     paths: Vec<Vec<String>>,
     names: BTreeMap<String, Vec<String>>,
 }
 
-/// The sets of files that use each other, directly or not.
-pub fn circles(root: &Path) -> Vec<BTreeSet<String>> {
+/// The modules of a crate, each with those whose files it uses.
+pub fn uses(root: &Path) -> BTreeMap<Module, BTreeSet<Module>> {
     let mut sources = BTreeMap::new();
     read(root, root, &mut sources);
-    let mut uses: BTreeMap<&Module, BTreeSet<&Module>> = BTreeMap::new();
-    for (module, source) in &sources {
+    let used = |(module, source): (&Module, &Source)| {
         let used = source.paths.iter().filter_map(|path| resolve(&sources, module, path, 0));
-        let used = used.filter(|other| !other.starts_with(module) && !module.starts_with(other));
-        uses.insert(module, used.collect());
+        (module.clone(), used.cloned().collect())
+    };
+    sources.iter().map(used).collect()
+}
+
+/// The sets of modules whose files use each other, directly or not.
+pub fn circles(root: &Path) -> Vec<BTreeSet<String>> {
+    let mut uses = uses(root);
+    for (module, used) in &mut uses {
+        used.retain(|other| !other.starts_with(module) && !module.starts_with(other));
     }
     let reached: BTreeMap<_, _> =
-        uses.keys().map(|&module| (module, reachable(&uses, module))).collect();
-    let circle = |module: &&Module| {
-        let others = reached[*module].iter().filter(|other| reached[**other].contains(*module));
-        others.map(|other| sources[*other].file.clone()).collect::<BTreeSet<_>>()
+        uses.keys().map(|module| (module, reachable(&uses, module))).collect();
+    let circle = |module: &Module| {
+        let others = reached[module].iter().filter(|other| reached[**other].contains(module));
+        others.map(|other| other.join("::")).collect::<BTreeSet<_>>()
     };
-    let found: BTreeSet<_> = uses.keys().map(circle).filter(|files| !files.is_empty()).collect();
+    let found: BTreeSet<_> = uses.keys().map(circle).filter(|circle| !circle.is_empty()).collect();
     found.into_iter().collect()
 }
 
 fn reachable<'a>(
-    uses: &BTreeMap<&'a Module, BTreeSet<&'a Module>>,
+    uses: &'a BTreeMap<Module, BTreeSet<Module>>,
     from: &Module,
 ) -> BTreeSet<&'a Module> {
     let mut found = BTreeSet::new();
-    let mut open: Vec<&Module> = uses[from].iter().copied().collect();
+    let mut open: Vec<&Module> = uses[from].iter().collect();
     while let Some(module) = open.pop() {
         if found.insert(module) {
             open.extend(&uses[module]);
@@ -66,7 +72,7 @@ fn read(root: &Path, folder: &Path, sources: &mut BTreeMap<Module, Source>) {
             continue;
         }
         let Some(stem) = name.strip_suffix(".rs") else { continue };
-        let file = path.strip_prefix(root).expect("below the root").to_string_lossy().into_owned();
+        let file = path.strip_prefix(root).expect("below the root").to_string_lossy();
         let mut module: Module = file.split('/').map(str::to_owned).collect();
         module.pop();
         match stem {
@@ -74,16 +80,16 @@ fn read(root: &Path, folder: &Path, sources: &mut BTreeMap<Module, Source>) {
             "build" | "main" | "tests" | "source_hash" => continue,
             _ => module.push(stem.to_owned()),
         }
-        sources.insert(module, parse(file, &fs::read_to_string(&path).expect("source text")));
+        sources.insert(module, parse(&fs::read_to_string(&path).expect("source text")));
     }
 }
 
-fn parse(file: String, text: &str) -> Source {
+fn parse(text: &str) -> Source {
     let text = text.split("\n#[cfg(test)]\nmod ").next().expect("a first part");
     let code: Vec<&str> =
         text.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
     let code = code.join("\n");
-    let mut source = Source { file, ..Source::default() };
+    let mut source = Source::default();
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
     for start in ["use ", "crate::", "super::", "self::"] {
         for (place, _) in code.match_indices(start) {
@@ -200,6 +206,6 @@ fn paths_lead_through_re_exports_to_the_files_that_define_names() {
     // Through the root, and through the folder's module.
     write("b/c.rs", "pub struct Two(pub(crate) crate::One);");
     write("a.rs", "use super::b::Two;\npub struct One;");
-    let expected = BTreeSet::from(["a.rs".to_owned(), "b/c.rs".to_owned()]);
+    let expected = BTreeSet::from(["a".to_owned(), "b::c".to_owned()]);
     assert_eq!(circles(folder.path()), [expected]);
 }

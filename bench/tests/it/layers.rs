@@ -2,13 +2,12 @@
 //! <- `run` <- `reports` <- `bench` <- `python`. Inside a crate files do not use each other in a circle.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
 
-use crate::circles::circles;
+use crate::circles::{Module, circles, uses};
 
 #[test]
 fn crates_depend_in_one_direction() {
@@ -61,13 +60,13 @@ fn crates_depend_in_one_direction() {
 fn methods_do_not_see_each_other() {
     let ids = "angle aof cover coverage_axis dey_zhao hem lambda pmat qmat sat sat_pairwise tam_heidrich tight vmas";
     let ids: Vec<&str> = ids.split(' ').collect();
-    let mut files = sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../methods"));
-    files.retain(|(owner, _)| ids.contains(&owner.as_str()));
-    assert!(files.len() >= ids.len(), "the sources were found");
-    for (owner, path) in files {
-        let used = used_modules(&fs::read_to_string(&path).expect("source text"));
-        let other = used.iter().find(|used| **used != owner && ids.contains(&used.as_str()));
-        assert_eq!(other, None, "{}", path.display());
+    let mut modules = uses(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../methods"));
+    modules.retain(|module, _| module.first().is_some_and(|owner| ids.contains(&owner.as_str())));
+    assert!(modules.len() >= ids.len(), "the sources were found");
+    for (module, used) in modules {
+        let is_other = |id: &String| *id != module[0] && ids.contains(&id.as_str());
+        let other = used.iter().find(|used| used.first().is_some_and(is_other));
+        assert_eq!(other, None, "{module:?}");
     }
 }
 
@@ -110,67 +109,17 @@ fn modules_use_only_those_below_them() {
 
 fn hold(root: &Path, layers: Layers<'_>) {
     let layer_of = |module: &str| layers.iter().position(|layer| layer.contains(&module));
-    let mut read = 0;
-    for (module, path) in sources(root) {
-        let Some(layer) = layer_of(&module) else {
-            panic!("{}: the module {module} has no layer", path.display());
-        };
-        read += 1;
-        for used in used_modules(&fs::read_to_string(&path).expect("source text")) {
-            let Some(other) = layer_of(&used) else { continue };
-            assert!(
-                other <= layer,
-                "{} uses `{used}`, which is not below `{module}`",
-                path.display()
-            );
+    let modules = uses(root);
+    assert!(modules.len() > 10, "the sources were found");
+    for (module, used) in modules {
+        // The root has re-exports.
+        let Some(top) = module.first() else { continue };
+        let layer = layer_of(top).unwrap_or_else(|| panic!("the module {top} has no layer"));
+        for other in used.iter().filter(|other| !other.is_empty()) {
+            let is_below = layer_of(&other[0]).is_some_and(|other| other <= layer);
+            assert!(is_below, "{module:?} uses {other:?}, which is not below `{top}`");
         }
     }
-    assert!(read > 10, "the sources were found");
-}
-
-/// The source files of a crate and the top-level module that each belongs to.
-fn sources(root: &Path) -> Vec<(String, PathBuf)> {
-    let mut found = Vec::new();
-    let mut folders = vec![root.to_owned()];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder).expect("a folder of sources") {
-            let path = entry.expect("an entry").path();
-            let relative = path.strip_prefix(root).expect("below the root");
-            let first = relative.components().next().expect("a name").as_os_str().to_string_lossy();
-            // Separate crates, also the kernel.
-            if ["geometry", "tests", "benches", "examples", "lib.rs", "main.rs"].contains(&&*first)
-            {
-                continue;
-            }
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
-                found.push((first.trim_end_matches(".rs").to_owned(), path));
-            }
-        }
-    }
-    found
-}
-
-/// The modules that code names as `crate::MODULE`, or in the braces of `use crate::{...}`; comments may name any.
-fn used_modules(text: &str) -> Vec<String> {
-    let code = text.lines().filter(|line| !line.trim_start().starts_with("//"));
-    let code = code.collect::<Vec<_>>().join("\n");
-    let word = |text: &str| -> String {
-        text.chars().take_while(|&c| c.is_alphanumeric() || c == '_').collect()
-    };
-    let mut used = Vec::new();
-    for (place, _) in code.match_indices("crate::") {
-        let after = &code[place + "crate::".len()..];
-        match after.strip_prefix('{') {
-            Some(list) => {
-                let end = list.find('}').unwrap_or(list.len());
-                used.extend(list[..end].split(',').map(|name| word(name.trim())));
-            }
-            None => used.push(word(after)),
-        }
-    }
-    used
 }
 
 #[test]
@@ -194,18 +143,12 @@ fn files_do_not_use_each_other_in_a_circle() {
 
 #[test]
 fn verbs_never_call_verbs() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("cmd");
-    let mut read = 0;
-    for (verb, path) in sources(&root) {
-        read += 1;
-        let text = fs::read_to_string(&path).expect("source text");
-        let paths = text.split("crate::cmd::").skip(1).chain(text.split(" super::").skip(1));
-        for used in paths {
-            let used: String =
-                used.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-            // Tests import everything of their own verb by `super::*`.
-            assert!(used == verb || used.is_empty(), "{} uses the verb {used}", path.display());
-        }
+    let mut modules = uses(Path::new(env!("CARGO_MANIFEST_DIR")));
+    modules.retain(|module, _| module.len() > 1 && module[0] == "cmd");
+    assert!(modules.len() > 10, "the sources were found");
+    for (module, used) in modules {
+        let is_other = |other: &&Module| other[..] != ["cmd"] && other.starts_with(&module[..1]);
+        let other = used.iter().filter(is_other).find(|other| other[1] != module[1]);
+        assert_eq!(other, None, "{module:?}");
     }
-    assert!(read > 10, "the sources were found");
 }
