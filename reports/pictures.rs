@@ -137,22 +137,3 @@ pub(crate) fn strips(comparison: &Comparison<'_>) -> BTreeMap<usize, PictureStri
     }
     strips
 }
-
-/// Of some meshes the one that separates the methods best at the count of the strips: among those that the most
-/// methods ran on the one with the largest ratio of the worst error to the best.
-pub(crate) fn widest_spread(
-    comparison: &Comparison<'_>,
-    meshes: impl Iterator<Item = usize>,
-) -> Option<usize> {
-    let level = usual_level(comparison).map(|(level, _)| level);
-    let ranked = meshes.map(|mesh| {
-        let here = || comparison.of_mesh(mesh).filter(|entry| Some(entry.level) == level);
-        let errors = here().filter(|entry| entry.measured()).filter_map(|e| HAUSDORFF.of(e.record));
-        let (least, most) =
-            errors.fold((f64::INFINITY, 0.0_f64), |(lo, hi), e| (lo.min(e), hi.max(e)));
-        (here().count(), most / least.max(1e-9), mesh)
-    });
-    // Of equal ones the first.
-    let best = ranked.max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(b.2.cmp(&a.2)));
-    best.map(|(_, _, mesh)| mesh)
-}

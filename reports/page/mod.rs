@@ -19,8 +19,7 @@ use serde_json::{Value, json};
 use crate::answers::usual_level;
 use crate::comparison::{Comparison, level_label};
 use crate::header::{Header, MethodNote, RunNote, method_pages};
-use crate::metric::{BELOW_30, COMPARED, EPSILON, Metric, SPHERES_ONLY};
-use crate::pictures::widest_spread;
+use crate::metric::{BELOW_30, COMPARED, EPSILON, HAUSDORFF, Metric, SPHERES_ONLY};
 use crate::plots::{Figure, symbol};
 use crate::tables::Table;
 
@@ -348,6 +347,25 @@ fn without_command(table: &Table) -> Table {
     let mut table = table.clone();
     table.notes.drain(..table.notes.len().min(1));
     table
+}
+
+/// Of some meshes the one that separates the methods best at the count of the strips: among those that the most
+/// methods ran on the one with the largest ratio of the worst error to the best.
+fn widest_spread(
+    comparison: &Comparison<'_>,
+    meshes: impl Iterator<Item = usize>,
+) -> Option<usize> {
+    let level = usual_level(comparison).map(|(level, _)| level);
+    let ranked = meshes.map(|mesh| {
+        let here = || comparison.of_mesh(mesh).filter(|entry| Some(entry.level) == level);
+        let errors = here().filter(|entry| entry.measured()).filter_map(|e| HAUSDORFF.of(e.record));
+        let (least, most) =
+            errors.fold((f64::INFINITY, 0.0_f64), |(lo, hi), e| (lo.min(e), hi.max(e)));
+        (here().count(), most / least.max(1e-9), mesh)
+    });
+    // Of equal ones the first.
+    let best = ranked.max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(b.2.cmp(&a.2)));
+    best.map(|(_, _, mesh)| mesh)
 }
 
 fn described(note: &MethodNote) -> Value {
