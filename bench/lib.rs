@@ -9,10 +9,10 @@
 //! | [`host`], [`process_tree`] | the process of the command, the end of child processes |
 //! | [`plugin`], [`check`] | methods as external programs, the conformance tests |
 //! | [`study`] | the items to run |
-//! | [`store`], [`exec`] | the folder of records, the workers |
-//! | [`rebuild`] | the report of a store |
-//! | [`args`], [`exit`], [`output`], [`files`], [`interrupt`] | shared by the verbs |
-//! | [`cmd`], [`cli`] | one file for each verb, their list |
+//! | `store`, `exec` | the folder of records, the workers |
+//! | `rebuild` | the report of a store |
+//! | `args`, [`exit`], `output`, `files`, `interrupt` | shared by the verbs |
+//! | `cmd`, [`cli`] | one file for each verb, their list |
 
 mod args;
 pub mod check;
