@@ -65,7 +65,7 @@ fn two_builds_take_turns() {
     // Programs with the name of the command that are no workers, or those of another protocol.
     for (k, (script, found)) in [
         ("exit 0", "the process ended with exit code 0"),
-        ("printf '\\n\\036\"Loading\"\\n'; read line", "no protocol"),
+        ("printf '\\n\\036\"Measuring\"\\n'; read line", "no protocol"),
         ("printf '\\n\\036{\"Ready\":0}\\n'; read line", "protocol 0"),
     ]
     .into_iter()
