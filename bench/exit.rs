@@ -4,9 +4,7 @@ use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
 
-use medial_run::error::FileError;
-use medial_run::input::InputError;
-use medial_run::library::PublicError;
+use medial_run::error::{FileError, InputError};
 
 /// Exit codes of the command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,23 +71,9 @@ impl From<FileError> for Failure {
     }
 }
 
-impl From<PublicError> for Failure {
-    fn from(error: PublicError) -> Self {
-        match error {
-            // The rest are names of the command line.
-            PublicError::File { .. } => Self::input(error),
-            _ => Self::usage(error),
-        }
-    }
-}
-
 impl From<InputError> for Failure {
     fn from(error: InputError) -> Self {
-        match error {
-            InputError::Read { .. } | InputError::Surface(_) => Self::input(error),
-            InputError::Library(error) => error.into(),
-            // A name or a resolution of the command line.
-            _ => Self::usage(error),
-        }
+        // Names are words of the command line.
+        if error.is_name { Self::usage(error) } else { Self::input(error) }
     }
 }

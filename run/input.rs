@@ -6,12 +6,13 @@ use std::{fmt, fs, io};
 use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeError, ShapeOptions};
 use medial::surface;
-use medial::surface::{SurfaceError, SurfaceReport, TriMesh};
+use medial::surface::{SurfaceReport, TriMesh};
 use medial_datasets::BuiltIn;
 use serde::{Deserialize, Serialize};
 
+use crate::error::InputError;
 use crate::hash::hex_digest;
-use crate::library::{Cached, Library, PublicError};
+use crate::library::{Cached, Library};
 use crate::text::did_you_mean;
 
 /// Origin of a mesh.
@@ -56,8 +57,7 @@ impl Source {
     /// Reads an argument: `builtin:ID` or `builtin:ID:RESOLUTION`, `dataset:NAME`, else a path.
     ///
     /// # Errors
-    /// [`InputError::BuiltIn`] when the resolution is not a number; [`InputError::Library`] when the library has no
-    /// such mesh.
+    /// When the resolution is not a number, or the library has no such mesh.
     pub fn parse(argument: &Path) -> Result<Self, InputError> {
         if let Some(name) = argument.to_str().and_then(|text| text.strip_prefix(DATASET)) {
             return Ok(Self::Cached(Library::here()?.mesh(name)?));
@@ -70,9 +70,7 @@ impl Source {
             Some((id, text)) => {
                 // Anything behind the second colon: a typing error must not become the default.
                 let resolution = text.parse().map_err(|_| {
-                    InputError::BuiltIn(format!(
-                        "wrong resolution `{text}`; write builtin:ID:NUMBER"
-                    ))
+                    InputError::name(format!("wrong resolution `{text}`; write builtin:ID:NUMBER"))
                 })?;
                 (id, Some(resolution))
             }
@@ -83,11 +81,13 @@ impl Source {
     /// Refuses missing and unreadable files, unknown shapes and resolutions out of range, before any run.
     ///
     /// # Errors
-    /// [`InputError`], which names the input.
+    /// The error names the input.
     pub fn check(&self) -> Result<(), InputError> {
         match self {
             Self::File(path) | Self::Cached(Cached { path, .. }) => {
-                let failed = |error| InputError::Read { path: path.clone(), error };
+                let failed = |error: io::Error| {
+                    InputError::file(path, format!("{error}{}", meant_shape(path)))
+                };
                 let kind = fs::metadata(path).map_err(failed)?;
                 // Opening a pipe or a device could wait for ever.
                 if !kind.is_file() {
@@ -117,7 +117,7 @@ impl Source {
     /// The inputs of a word of `--dataset`: the set `builtin`, a built-in shape, or meshes of the library.
     ///
     /// # Errors
-    /// [`InputError::Library`] for an unknown name, or a mesh that was not fetched.
+    /// For an unknown name, or a mesh that was not fetched.
     pub fn set(word: &str) -> Result<Vec<Self>, InputError> {
         if word == "builtin" {
             return Ok(Self::built_ins());
@@ -243,7 +243,7 @@ fn built_in(
     let shape = medial_datasets::find(id).ok_or_else(|| {
         let ids = medial_datasets::catalogue().into_iter().map(|shape| shape.id);
         let meant = did_you_mean(id, ids.collect::<Vec<_>>());
-        InputError::BuiltIn(format!(
+        InputError::name(format!(
             "unknown built-in shape `{id}`{meant}; list all names by `medial datasets list`"
         ))
     })?;
@@ -251,14 +251,14 @@ fn built_in(
     let range = shape.resolutions();
     if !range.contains(&resolution) {
         let (least, most) = (range.start(), range.end());
-        return Err(InputError::BuiltIn(format!(
+        return Err(InputError::name(format!(
             "builtin:{id}: wrong resolution (found {resolution}, expected {least} to {most})"
         )));
     }
     // Estimated, because generating the mesh would take too long.
     let vertices = estimated_vertices(&shape, resolution);
     if vertices > MAX_VERTICES {
-        return Err(InputError::BuiltIn(format!(
+        return Err(InputError::name(format!(
             "builtin:{id}: resolution {resolution} is too fine (about {vertices:.1e} vertices, at most \
              {MAX_VERTICES:.0e})"
         )));
@@ -289,26 +289,4 @@ fn surface_bytes(mesh: &TriMesh) -> Vec<u8> {
     let coordinates = mesh.vertices.iter().flat_map(|v| v.to_array());
     let indices = mesh.faces.iter().flatten();
     coordinates.flat_map(f64::to_le_bytes).chain(indices.flat_map(|i| i.to_le_bytes())).collect()
-}
-
-/// The reason for which an input cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum InputError {
-    /// The file cannot be read.
-    #[error("{}: {error}{}", path.display(), meant_shape(path))]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The error of the system.
-        error: io::Error,
-    },
-    /// The surface is refused.
-    #[error(transparent)]
-    Surface(#[from] SurfaceError),
-    /// The library has no such mesh.
-    #[error(transparent)]
-    Library(#[from] PublicError),
-    /// The built-in shape is unknown, or its resolution out of range.
-    #[error("{0}")]
-    BuiltIn(String),
 }

@@ -10,35 +10,12 @@ use etcetera::BaseStrategy;
 use medial_datasets::published::{Catalogue, Published, Set, published};
 use serde::{Deserialize, Serialize};
 
+use crate::error::InputError;
 use crate::hash::hex_digest;
 use crate::text::did_you_mean;
 
-/// An error about published meshes.
-#[derive(Debug, thiserror::Error)]
-pub enum PublicError {
-    /// The system has no cache folder.
-    #[error("no cache folder found; set MEDIAL_CACHE to a folder")]
-    NoFolder,
-    /// The file system refused, or `MEDIAL_CATALOGUE` is not a valid catalogue.
-    #[error("{}: {why}", path.display())]
-    File {
-        /// The file or folder.
-        path: PathBuf,
-        /// The problem.
-        why: String,
-    },
-    /// The requested name is unknown, or some of its meshes are not in the folder; with advice.
-    #[error("{0}")]
-    Name(String),
-}
-
 /// An error message lists at most this many names.
 const MOST_NAMES: usize = 5;
-
-/// An error about a path.
-fn at(path: &Path, why: impl ToString) -> PublicError {
-    PublicError::File { path: path.to_owned(), why: why.to_string() }
-}
 
 /// A mesh in the folder.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -87,7 +64,7 @@ impl Library {
     ///
     /// # Errors
     /// When there is no such folder, or the catalogue cannot be read.
-    pub fn here() -> Result<Self, PublicError> {
+    pub fn here() -> Result<Self, InputError> {
         // Shells unset a variable for a single command by an empty value.
         let [cache, catalogue] = ["MEDIAL_CACHE", "MEDIAL_CATALOGUE"]
             .map(|name| env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from));
@@ -95,14 +72,18 @@ impl Library {
             Some(folder) => folder,
             None => etcetera::choose_base_strategy()
                 .map(|folders| folders.cache_dir().join("medial"))
-                .map_err(|_| PublicError::NoFolder)?,
+                .map_err(|_| {
+                    InputError::name("no cache folder found; set MEDIAL_CACHE to a folder")
+                })?,
         };
         // Workers and clients have other working folders.
-        let folder = std::path::absolute(&folder).map_err(|error| at(&folder, error))?;
+        let folder =
+            std::path::absolute(&folder).map_err(|error| InputError::file(&folder, error))?;
         let catalogue = match catalogue {
             Some(path) => {
-                let text = fs::read_to_string(&path).map_err(|error| at(&path, error))?;
-                Cow::Owned(Catalogue::parse(&text).map_err(|why| at(&path, why))?)
+                let text =
+                    fs::read_to_string(&path).map_err(|error| InputError::file(&path, error))?;
+                Cow::Owned(Catalogue::parse(&text).map_err(|why| InputError::file(&path, why))?)
             }
             None => Cow::Borrowed(published()),
         };
@@ -123,22 +104,22 @@ impl Library {
     ///
     /// # Errors
     /// When it is there and cannot be read.
-    pub fn state(&self, mesh: &Published) -> Result<State, PublicError> {
+    pub fn state(&self, mesh: &Published) -> Result<State, InputError> {
         let path = self.path(mesh);
         match fs::read(&path) {
             // Cached files can be deleted or damaged: only the content counts.
             Ok(bytes) if hex_digest(&bytes) == mesh.sha256 => Ok(State::Here),
             Ok(_) => Ok(State::Another),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(State::Missing),
-            Err(error) => Err(at(&path, error)),
+            Err(error) => Err(InputError::file(&path, error)),
         }
     }
 
     /// The meshes of the catalogue with a name: that of a set, a package, or one mesh.
     ///
     /// # Errors
-    /// [`PublicError::Name`].
-    pub fn matching(&self, word: &str) -> Result<Vec<&Published>, PublicError> {
+    /// When nothing has the name.
+    pub fn matching(&self, word: &str) -> Result<Vec<&Published>, InputError> {
         let set = Set::ALL.into_iter().find(|set| set.key() == word);
         let mut found: Vec<_> = self.catalogue.meshes.iter().collect();
         found.retain(|mesh| match set {
@@ -153,7 +134,7 @@ impl Library {
     ///
     /// # Errors
     /// When the name is unknown, or a mesh is not in the folder; the message has the command that fetches it.
-    pub fn meshes(&self, word: &str) -> Result<Vec<Cached>, PublicError> {
+    pub fn meshes(&self, word: &str) -> Result<Vec<Cached>, InputError> {
         let mut found = self.matching(word)?;
         // A package may hold defective meshes, which a comparison would refuse.
         if found.iter().all(|mesh| mesh.package == word) {
@@ -182,14 +163,14 @@ impl Library {
             names.truncate(MOST_NAMES);
             names.push(format!("{more} more"));
         }
-        Err(PublicError::Name(format!("{word}: not fetched ({}); {how}", names.join(", "))))
+        Err(InputError::name(format!("{word}: not fetched ({}); {how}", names.join(", "))))
     }
 
     /// The mesh with a name.
     ///
     /// # Errors
     /// As [`Library::meshes`]; sets and packages are unknown here.
-    pub fn mesh(&self, name: &str) -> Result<Cached, PublicError> {
+    pub fn mesh(&self, name: &str) -> Result<Cached, InputError> {
         // Sets and packages are words of `--dataset`, which allows several meshes.
         if !self.catalogue.meshes.iter().any(|mesh| mesh.name == name) {
             return Err(self.unknown(name));
@@ -198,12 +179,12 @@ impl Library {
         cached.ok_or_else(|| self.unknown(name))
     }
 
-    fn unknown(&self, word: &str) -> PublicError {
+    fn unknown(&self, word: &str) -> InputError {
         let meshes = self.catalogue.meshes.iter().map(|mesh| mesh.name.as_str());
         let packages = self.catalogue.packages.iter().map(|package| package.id.as_str());
         let sets = Set::ALL.map(Set::key).into_iter().chain(["builtin"]);
         let meant = did_you_mean(word, sets.chain(packages).chain(meshes));
-        PublicError::Name(format!(
+        InputError::name(format!(
             "unknown set, package or mesh `{word}`{meant}; list all names by `medial datasets list`"
         ))
     }

@@ -24,7 +24,7 @@ use medial::metrics::MetricError;
 use medial::shape::ShapeError;
 use medial::simplifier::{Progress, RunContext, SimplifyError};
 use medial::surface::{BvhError, SurfaceError};
-use medial_run::input::InputError;
+use medial_run::error::InputError;
 use medial_run::reconstruct::ReconstructError;
 use medial_run::record::Status;
 use medial_run::timed::Fault;
