@@ -408,118 +408,92 @@ fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) ->
     row_of(comparison, &error_criterion(errors, title.clone()), title, &ranks, &pairs)
 }
 
-/// All methods at one error bound.
-pub(crate) struct BoundSummary {
-    /// The bound, in % of the diagonal.
-    pub(crate) percent: f64,
-    pub(crate) rows: Vec<BoundRow>,
-}
-
 /// One method at one error bound.
-pub(crate) struct BoundRow {
-    pub(crate) series: usize,
-    /// Meshes that the method ran on, and those with a level within the bound.
-    pub(crate) requested: usize,
-    pub(crate) met: usize,
-    /// Meshes without a result for another reason than the bound.
-    pub(crate) failed: usize,
-    /// Median over the meshes, where a missing result counts as infinite; `None` where the median is infinite.
-    pub(crate) spheres: Option<f64>,
-    numbers: Option<f64>,
-    seconds: Option<f64>,
+struct BoundRow<'c> {
+    /// The bound, in % of the diagonal.
+    percent: f64,
+    /// The entries of the method, at least one.
+    entries: Vec<&'c Entry<'c>>,
+    /// Those with a level within the bound.
+    met: Vec<&'c Entry<'c>>,
     /// Ratio of spheres to the reference method's.
     ratio: Option<Ratio>,
-    topology: (usize, usize),
 }
 
-/// Summaries for every requested bound, from loose to tight.
-pub(crate) fn by_bound(comparison: &Comparison<'_>) -> Vec<BoundSummary> {
+impl<'c> BoundRow<'c> {
+    fn new(percent: f64, entries: Vec<&'c Entry<'c>>, yardstick: &[&Entry<'_>]) -> Self {
+        let met: Vec<&Entry<'_>> =
+            entries.iter().copied().filter(|entry| entry.measured()).collect();
+        let ratios = met.iter().filter_map(|entry| {
+            let other = yardstick.iter().find(|o| o.mesh == entry.mesh && o.measured())?;
+            Some(reached(entry.record)? as f64 / reached(other.record)? as f64)
+        });
+        let ratio = Ratio::of(ratios);
+        Self { percent, entries, met, ratio }
+    }
+
+    /// The median over the meshes that the method ran on, where a missing value counts as infinite; `None` where the
+    /// median is infinite.
+    fn median(&self, value: impl Fn(&Record) -> Option<f64>) -> Option<f64> {
+        let mut values: Vec<f64> =
+            self.met.iter().filter_map(|entry| value(entry.record)).collect();
+        values.resize(self.entries.len(), f64::INFINITY); // a failure is no cheap result
+        // The upper median: at least half of the meshes need no more.
+        median(&values).filter(|value| value.is_finite())
+    }
+
+    fn spheres(&self) -> Option<f64> {
+        self.median(|record| reached(record).map(|spheres| spheres as f64))
+    }
+
+    /// Meshes without a result for another reason than the bound.
+    fn failed(&self) -> usize {
+        let is_missed = |entry: &&&Entry<'_>| entry.record.status == Status::BoundMissed;
+        self.entries.len() - self.met.len() - self.entries.iter().filter(is_missed).count()
+    }
+}
+
+/// The table of all bounds, from loose to tight; `None` without a requested bound.
+pub(crate) fn equal_error_table(comparison: &Comparison<'_>, how: &str) -> Option<Table> {
     let reference = reference(comparison);
-    let mut summaries = vec![];
+    let mut rows: Vec<BoundRow<'_>> = vec![];
     for (level, target) in comparison.levels.iter().enumerate() {
         let Target::MaxError(bound) = target else { continue }; // others have tables of their own
-        let yardstick = reference.map_or(vec![], |series| comparison.at(series, level));
-        let rows = (0..comparison.series.len())
-            .map(|series| (series, comparison.at(series, level)))
-            .filter(|(_, entries)| !entries.is_empty())
-            .map(|(series, entries)| bound_row(series, &entries, &yardstick))
-            .collect();
         // In percent, without the digits that a fraction of two cannot hold: 0.3 %, not 0.30000000000000004 %.
-        summaries.push(BoundSummary { percent: (bound * 1e12).round() / 1e10, rows });
-    }
-    summaries
-}
-
-fn bound_row(series: usize, entries: &[&Entry<'_>], yardstick: &[&Entry<'_>]) -> BoundRow {
-    let met: Vec<&Entry<'_>> = entries.iter().copied().filter(|entry| entry.measured()).collect();
-    let missed = entries.iter().filter(|e| e.record.status == Status::BoundMissed).count();
-    let ratios = met.iter().filter_map(|entry| {
-        let other = yardstick.iter().find(|o| o.mesh == entry.mesh && o.measured())?;
-        Some(reached(entry.record)? as f64 / reached(other.record)? as f64)
-    });
-    let requested = entries.len();
-    BoundRow {
-        series,
-        requested,
-        met: met.len(),
-        failed: requested - met.len() - missed,
-        spheres: median_of(&met, requested, |record| reached(record).map(|spheres| spheres as f64)),
-        numbers: median_of(&met, requested, stored_numbers),
-        seconds: median_of(&met, requested, |record| TOTAL_SECONDS.of(record)),
-        ratio: Ratio::of(ratios),
-        topology: topology(&met),
-    }
-}
-
-/// The median over `requested` meshes, where a missing value counts as infinite.
-fn median_of(
-    met: &[&Entry<'_>],
-    requested: usize,
-    value: impl Fn(&Record) -> Option<f64>,
-) -> Option<f64> {
-    let mut values: Vec<f64> = met.iter().filter_map(|entry| value(entry.record)).collect();
-    values.resize(requested, f64::INFINITY); // a failure is no cheap result
-    // The upper median: at least half of the meshes need no more.
-    median(&values).filter(|value| value.is_finite())
-}
-
-/// The table of all bounds; `None` without a requested bound.
-pub(crate) fn equal_error_table(
-    comparison: &Comparison<'_>,
-    bounds: &[BoundSummary],
-    how: &str,
-) -> Option<Table> {
-    type BoundPosition<'b> = (f64, &'b BoundRow);
-    let mut rows: Vec<BoundPosition<'_>> = vec![];
-    for bound in bounds {
-        let mut sorted: Vec<&BoundRow> = bound.rows.iter().collect();
+        let percent = (bound * 1e12).round() / 1e10;
+        let yardstick = reference.map_or(vec![], |series| comparison.at(series, level));
+        let entries = (0..comparison.series.len()).map(|series| comparison.at(series, level));
+        let entries = entries.filter(|entries| !entries.is_empty());
+        let own = entries.map(|entries| BoundRow::new(percent, entries, &yardstick));
+        let mut own: Vec<BoundRow<'_>> = own.collect();
         // Fewest spheres first. Rows without a median follow, most meshes within the bound first.
-        sorted.sort_by(|a, b| {
-            let [few, many] = [a, b].map(|row| row.spheres.unwrap_or(f64::INFINITY));
-            few.total_cmp(&many).then(b.met.cmp(&a.met))
+        own.sort_by(|a, b| {
+            let [few, many] = [a, b].map(|row| row.spheres().unwrap_or(f64::INFINITY));
+            few.total_cmp(&many).then(b.met.len().cmp(&a.met.len()))
         });
-        rows.extend(sorted.into_iter().map(|row| (bound.percent, row)));
+        rows.extend(own);
     }
-    let yardstick = reference(comparison).map_or("reference", |series| &comparison.series[series]);
+    let yardstick = reference.map_or("reference", |series| &comparison.series[series]);
     let whole =
         |value: Option<f64>| Cell::optional(value.map(|value| grouped(value.round() as u64)));
     let rows = Table::of(&rows)
-        .number("error (%)", |(percent, _)| percent.to_string())
-        .text("method", |(_, row)| comparison.series[row.series].as_str())
-        .text("valid on", |(_, row)| format!("{} of {}", row.met, row.requested))
-        .number("spheres ↓", |(_, row)| whole(row.spheres))
-        .number(format!("÷ {yardstick}"), |(_, row)| {
+        .number("error (%)", |row| row.percent.to_string())
+        .text("method", |row| comparison.series[row.entries[0].series].as_str())
+        .text("valid on", |row| format!("{} of {}", row.met.len(), row.entries.len()))
+        .number("spheres ↓", |row| whole(row.spheres()))
+        .number(format!("÷ {yardstick}"), |row| {
             Cell::optional(row.ratio.as_ref().map(Ratio::text))
         })
-        .text("on", |(_, row)| {
+        .text("on", |row| {
             Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes")))
         })
-        .number("stored numbers ↓", |(_, row)| whole(row.numbers))
-        .number("total (s) ↓", |(_, row)| {
-            Cell::optional(row.seconds.map(|seconds| significant(seconds, 3)))
+        .number("stored numbers ↓", |row| whole(row.median(stored_numbers)))
+        .number("total (s) ↓", |row| {
+            let seconds = row.median(|record| TOTAL_SECONDS.of(record));
+            Cell::optional(seconds.map(|seconds| significant(seconds, 3)))
         })
-        .text("topology right", |(_, row)| Cell::share(row.topology))
-        .text("failed", |(_, row)| match row.failed {
+        .text("topology right", |row| Cell::share(topology(&row.met)))
+        .text("failed", |row| match row.failed() {
             0 => "none".to_owned(),
             failed => failed.to_string(),
         });

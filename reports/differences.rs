@@ -94,20 +94,9 @@ fn p_text(p: f64) -> String {
 /// Every pair of methods at every number of spheres with all digits, as CSV.
 pub(crate) fn differences_csv(comparison: &Comparison<'_>) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(vec![]);
-    writer.write_record([
-        "spheres",
-        "method",
-        "other",
-        "better",
-        "equal",
-        "worse",
-        "ratio",
-        "ratio_low",
-        "ratio_high",
-        "effect",
-        "p",
-        "p_corrected",
-    ])?;
+    let heads =
+        "spheres method other better equal worse ratio ratio_low ratio_high effect p p_corrected";
+    writer.write_record(heads.split(' '))?;
     for (spheres, pairs) in rankings(comparison) {
         let names = pairs.series.iter().enumerate();
         let names = names.flat_map(|(k, &a)| pairs.series[k + 1..].iter().map(move |&b| [a, b]));

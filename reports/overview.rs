@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use medial_run::record::Record;
 use medial_run::text::{counted, grouped, printable, shortened};
 
-use crate::answers::{by_bound, equal_error_table, usual_level};
+use crate::answers::{equal_error_table, usual_level};
 use crate::comparison::{Comparison, RISING, reached, row_name};
 use crate::header::MethodNote;
 use crate::metric::{FROZEN_SECONDS, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
@@ -103,7 +103,7 @@ pub fn summary_text(records: &[Record], methods: &[MethodNote]) -> String {
         text += &format!("{}\n{}", table.caption, plain(&table));
         table.notes.iter().for_each(|note| text += &wrapped(note));
     }
-    if let Some(table) = equal_error_table(&comparison, &by_bound(&comparison), "") {
+    if let Some(table) = equal_error_table(&comparison, "") {
         let table = table.without(&["on", "stored numbers ↓", "failed"]); // wider than a line
         text += &format!("\n{}\n{}", table.caption, plain(&table));
     }

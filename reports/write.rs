@@ -12,7 +12,7 @@ use medial_run::journal::replace_file;
 use medial_run::record::Record;
 use medial_run::text::file_stems;
 
-use crate::answers::{by_bound, equal_error_table, purpose_table};
+use crate::answers::{equal_error_table, purpose_table};
 use crate::comparison::Comparison;
 use crate::differences::{difference_tables, differences_csv};
 use crate::header::Header;
@@ -45,7 +45,7 @@ pub fn write_report(
 ) -> Result<Vec<PathBuf>, FileError> {
     let comparison = Comparison::new(records);
     let is_one = comparison.meshes.len() == 1;
-    let (summaries, bounds) = (by_count(&comparison), by_bound(&comparison));
+    let summaries = by_count(&comparison);
     let natives = native_curves(&comparison);
     let how = header.how();
     let mut files = Files { dir, written: Vec::new() };
@@ -57,8 +57,7 @@ pub fn write_report(
     }
 
     let answers = purpose_table(&comparison, header, &how);
-    let mut equal_error: Vec<Table> =
-        equal_error_table(&comparison, &bounds, &how).into_iter().collect();
+    let mut equal_error: Vec<Table> = equal_error_table(&comparison, &how).into_iter().collect();
     let mut means = vec![means_table(&comparison, &summaries, &how)];
     if !natives.is_empty() {
         means.push(native_table(&comparison, &natives, header, &how));
