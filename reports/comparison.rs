@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 use medial_run::level::Target;
-use medial_run::record::{COUNT_TOLERANCE, Record, Status};
+use medial_run::record::{Record, Status, is_near};
 use medial_run::text::{counted, grouped, printable, trimmed};
 
 use crate::metric::{COMPARED, FROZEN_SECONDS, HAUSDORFF, Metric};
@@ -47,7 +47,7 @@ impl Entry<'_> {
     pub(crate) fn comparable(&self) -> bool {
         match (self.record.simplify.level, reached(self.record)) {
             (Target::Spheres(requested), Some(reached)) if self.measured() => {
-                reached.abs_diff(requested) as f64 <= COUNT_TOLERANCE * requested as f64
+                is_near(reached, requested)
             }
             _ => false,
         }

@@ -8,8 +8,7 @@ use medial::simplifier::Simplified;
 use crate::item::{GIVEN, Item};
 use crate::level::Target;
 use crate::record::{
-    COUNT_TOLERANCE, Conditions, OwnSeconds, Provenance, Record, Repetition, Simplify, Stages,
-    Status,
+    Conditions, OwnSeconds, Provenance, Record, Repetition, Simplify, Stages, Status, is_near,
 };
 use crate::scene::{Scene, Verdict};
 use crate::text::file_stem;
@@ -41,9 +40,6 @@ pub fn failure_record(
         status: *status,
         reason: Some(reason.clone()),
         simplify,
-        evaluate: None,
-        evaluate_seconds: None,
-        initial: None,
         conditions: Some(Conditions {
             sampling: scene.settings.sampling.to_string(),
             dual: scene.settings.dual.to_string(),
@@ -54,17 +50,13 @@ pub fn failure_record(
             jobs: 1,
             fingerprint: item.method.fingerprint.clone(),
         }),
-        result_hash: None,
         seeds: seeds.map(|(purpose, seed)| (purpose.to_owned(), seed)).into(),
-        repetitions: vec![],
         machine: provenance.machine.clone(),
         method_version: item.version.clone(),
         binary_hash: item.binary.clone(),
         command: provenance.command.clone(),
         version: provenance.version.clone(),
-        artifact: None,
-        edition: None,
-        is_other_version: false,
+        ..Record::default()
     }
 }
 
@@ -149,9 +141,7 @@ pub fn fill_result(simplify: &mut Simplify, result: &Simplified) {
 pub fn count_fault(level: Target, result: &Simplified) -> Fault {
     let reached = result.mesh.spheres.len();
     match level {
-        Target::Spheres(asked)
-            if reached.abs_diff(asked) as f64 > COUNT_TOLERANCE * asked as f64 =>
-        {
+        Target::Spheres(asked) if !is_near(reached, asked) => {
             let why = result.diagnostics.warnings.join("; ");
             let why = if why.is_empty() { why } else { format!(": {why}") };
             let reason = format!("{reached} spheres where {asked} were asked{why}");

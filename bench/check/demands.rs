@@ -10,6 +10,7 @@ use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, RunContext, Simplification, Simplified, SimplifyError};
 use medial::surface::{self, TriMesh};
+use medial_run::record::is_near;
 
 use super::{CaseResult, Outcome, Subject, failed, miss};
 use crate::plugin::is_id;
@@ -158,9 +159,6 @@ fn refusal(place: &str, error: &SimplifyError) -> CaseResult {
 /// Shapes that differ in kind: thin, round, looped, hollow, sharp.
 const SHAPES: [&str; 6] = ["sphere", "box", "capsule", "torus", "hollow-sphere", "bracket"];
 
-/// Largest relative difference between the requested and the reached count.
-const TOLERANCE: f64 = 0.02;
-
 /// No medial mesh here has as many spheres.
 const HUGE: usize = 1_000_000_000;
 
@@ -224,8 +222,7 @@ fn at_count(
 ) -> Result<Simplified, Outcome> {
     let result = subject.at(simplification, shape, Level::Spheres(count))?;
     let reached = result.mesh.spheres.len();
-    let near = reached.abs_diff(count) as f64 <= TOLERANCE * count as f64;
-    if near || !result.diagnostics.warnings.is_empty() {
+    if is_near(reached, count) || !result.diagnostics.warnings.is_empty() {
         return Ok(result);
     }
     // Exception: all spheres of the initial medial mesh need no warning where more are requested.

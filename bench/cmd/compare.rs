@@ -27,7 +27,6 @@ use crate::study::external::ExternalResult;
 use crate::study::registry::Registry;
 use crate::study::{Study, StudyMethod, shard};
 
-/// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Surface files (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`
@@ -196,7 +195,7 @@ pub fn run(
     }
     let mut on_recorded = |waiting: &[&Item]| pages.write(waiting);
     let sides = std::slice::from_mut(&mut side);
-    let ended = run_items(&left, sides, global.progress(), &mut on_recorded);
+    let ended = run_items(&left, sides, global.quiet, &mut on_recorded);
     let run = side.store.added;
     // The flag has no effect from here on.
     if interrupt::stop_listening() {
@@ -413,7 +412,7 @@ fn finish(
     };
     if global.json {
         let by_status: serde_json::Map<String, serde_json::Value> =
-            Status::ALL.iter().map(|&s| (s.key().to_owned(), count(records, s).into())).collect();
+            Status::ALL.iter().map(|&s| (s.key(), count(records, s).into())).collect();
         let object = json!({
             "out": out, "records": records.len(), "run": run, "found": found,
             "status": by_status, "results": out.join(RESULTS), "page": page, "files": files,

@@ -15,7 +15,7 @@ use medial_reports::editions::{DESCRIPTION, EDITIONS, Embedded, RECORDS, unpack}
 use medial_run::hash::hex_digest;
 use medial_run::item::Item;
 use medial_run::level::Target;
-use medial_run::record::{COUNT_TOLERANCE, Record};
+use medial_run::record::{Record, is_near};
 use medial_run::settings::VOLUME_DEPTH;
 use medial_run::text::did_you_mean;
 use medial_run::text::significant;
@@ -232,8 +232,7 @@ impl Edition {
         let Some(mesh) = mesh.iter().find(|mesh| mesh.sha256 == hash) else {
             return format!("this mesh is not in edition {name}");
         };
-        let near = |count: usize| own.abs_diff(count) as f64 <= COUNT_TOLERANCE * count as f64;
-        let Some(&count) = spheres.iter().find(|&&count| near(count)) else {
+        let Some(&count) = spheres.iter().find(|&&count| is_near(own, count)) else {
             let known: Vec<String> = spheres.iter().map(usize::to_string).collect();
             let known = known.join(", ");
             return format!("edition {name} has no results near {own} spheres (it has {known})");

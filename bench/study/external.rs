@@ -22,7 +22,7 @@ use medial_run::axis::{
 use medial_run::hash::hex_digest;
 use medial_run::item::{GIVEN, Item, MethodSpec};
 use medial_run::level::Target;
-use medial_run::record::{COUNT_TOLERANCE, OwnSeconds, Provenance};
+use medial_run::record::{OwnSeconds, Provenance, is_near};
 use medial_run::scene::SceneSpec;
 use serde::{Deserialize, Serialize};
 
@@ -327,11 +327,6 @@ pub(crate) struct ExternalFile {
     hash: String,
     /// Requested number of spheres, which the result has to within 2 %.
     spheres: usize,
-}
-
-/// Whether a result counts as one with a requested number of spheres.
-fn is_near(spheres: usize, requested: usize) -> bool {
-    spheres.abs_diff(requested) as f64 <= COUNT_TOLERANCE * requested as f64
 }
 
 impl Study {

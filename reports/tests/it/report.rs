@@ -108,9 +108,8 @@ fn every_record_is_a_row_of_the_csv_with_its_numbers() {
     let mut expected: Vec<[String; 4]> = (records.iter())
         .map(|r| {
             let error = r.evaluate.as_ref().map(|e| e.distances.hausdorff.to_string());
-            let names = [r.mesh.as_str(), r.simplify.method.as_str(), r.status.key()];
-            let [mesh, method, status] = names.map(str::to_owned);
-            [mesh, method, status, error.unwrap_or_default()]
+            let (mesh, method) = (r.mesh.clone(), r.simplify.method.clone());
+            [mesh, method, r.status.key(), error.unwrap_or_default()]
         })
         .collect();
     found.sort_unstable();
