@@ -13,11 +13,10 @@ use medial_run::axis::{AxisOptions, FitBy, RadiiFrom};
 use serde::de::DeserializeOwned;
 
 use crate::exit::Failure;
-use crate::progress::Verbosity;
+use crate::progress::StageLine;
 use crate::study::registry::{Entry, Registry};
 use crate::study::{LEAST_SAMPLES, MOST_SAMPLES, MOST_THREADS, Study};
 
-/// Options of every verb.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Global options")]
 pub struct Global {
@@ -41,14 +40,9 @@ pub struct Global {
 }
 
 impl Global {
-    /// Whether the progress of a list of items is shown.
-    pub fn progress(&self) -> Verbosity {
-        if self.quiet { Verbosity::Quiet } else { Verbosity::Progress }
-    }
-
-    /// Whether the stages of a single task are shown. JSON output is for programs and hides them.
-    pub fn stages(&self) -> Verbosity {
-        if self.json { Verbosity::Quiet } else { self.progress() }
+    /// A line with the stage of a single task. JSON output is for programs and hides it.
+    pub fn stages(&self) -> StageLine {
+        StageLine::new(self.quiet || self.json)
     }
 }
 
@@ -84,7 +78,6 @@ impl SubstrateArguments {
         Ok(if seeded { sampling } else { sampling.with_seed(self.seed()) })
     }
 
-    /// The options of a shape.
     pub fn shape_options(&self) -> Result<ShapeOptions, Failure> {
         let dual = self.dual.unwrap_or_default();
         Ok(ShapeOptions { sampling: self.sampling()?, dual })
@@ -152,7 +145,6 @@ impl From<AxisArguments> for AxisOptions {
     }
 }
 
-/// How results are measured.
 #[derive(Clone, Debug, Args)]
 pub struct MeasureArguments {
     /// Measure errors at N surface samples, at least 100, in addition to the vertices, and at N samples of the
@@ -166,7 +158,6 @@ pub struct MeasureArguments {
 }
 
 impl MeasureArguments {
-    /// The options of the judge.
     pub fn judge_options(&self, seed: u64) -> JudgeOptions {
         let defaults = JudgeOptions::default();
         JudgeOptions { samples: self.samples.unwrap_or(defaults.samples), seed, ..defaults }
@@ -203,7 +194,6 @@ pub fn key_value(text: &str) -> Result<(String, String), String> {
     Ok((key.to_owned(), value.to_owned()))
 }
 
-/// Parameters from keys and values.
 pub fn params(words: &[(String, String)]) -> Params {
     let mut params = Params::none();
     words.iter().for_each(|(key, value)| params.set(key, value));

@@ -17,19 +17,11 @@ const INTERVAL: Duration = Duration::from_millis(250);
 /// Shorter stages are not shown.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Whether progress is shown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verbosity {
-    /// Only reasons of missing results go to standard error.
-    Quiet,
-    /// Progress goes there, too.
-    Progress,
-}
-
 /// Progress through a known list of runs of methods: a bar on a terminal, else lines.
 pub struct Progress {
     bar: Option<ProgressBar>,
-    verbosity: Verbosity,
+    /// Whether only reasons of missing results go to standard error.
+    is_quiet: bool,
     begun: usize,
     total: usize,
     jobs: usize,
@@ -41,9 +33,9 @@ pub struct Progress {
 
 impl Progress {
     /// Progress through a turn of each of these methods, of which `jobs` run at the same time.
-    pub fn new(verbosity: Verbosity, turns: Vec<&str>, jobs: usize) -> Self {
+    pub fn new(is_quiet: bool, turns: Vec<&str>, jobs: usize) -> Self {
         // In a log file a bar would be one long line of control characters.
-        let is_drawn = verbosity == Verbosity::Progress && io::stderr().is_terminal();
+        let is_drawn = !is_quiet && io::stderr().is_terminal();
         let bar = is_drawn.then(|| ProgressBar::new(turns.len() as u64));
         if let Some(bar) = &bar {
             let style = ProgressStyle::with_template("{bar:30} {pos}/{len}  {elapsed}  {msg}");
@@ -51,7 +43,7 @@ impl Progress {
             bar.enable_steady_tick(INTERVAL);
         }
         let ahead: Vec<String> = turns.into_iter().map(str::to_owned).collect();
-        Self { bar, verbosity, begun: 0, total: ahead.len(), jobs, ahead, seen: Vec::new() }
+        Self { bar, is_quiet, begun: 0, total: ahead.len(), jobs, ahead, seen: Vec::new() }
     }
 
     /// Shows the current mesh and method, and the number of the repetition among `of`.
@@ -68,7 +60,7 @@ impl Progress {
                 bar.set_message(printable(&format!("{mesh}: {method}{turn}{left}")));
             }
             // One line for each mesh and method.
-            None if turn == 1 && self.verbosity == Verbosity::Progress => {
+            None if turn == 1 && !self.is_quiet => {
                 self.remark(&format!("[{}/{}] {mesh}: {method}{left}", self.begun, self.total));
             }
             None => {}
@@ -124,12 +116,9 @@ pub struct StageLine {
 }
 
 impl StageLine {
-    /// A line; none without a terminal or with [`Verbosity::Quiet`].
-    pub fn new(verbosity: Verbosity) -> Self {
-        let bar = match verbosity {
-            Verbosity::Quiet => ProgressBar::hidden(),
-            Verbosity::Progress => ProgressBar::new_spinner(),
-        };
+    /// A line; none without a terminal or if it `is_hidden`.
+    pub fn new(is_hidden: bool) -> Self {
+        let bar = if is_hidden { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
         let stage = Arc::new(Mutex::new(String::new()));
         let shown = Arc::clone(&stage);
         let line = move |state: &ProgressState, out: &mut dyn fmt::Write| {

@@ -69,7 +69,6 @@ impl Store {
         Ok(Self { dir: dir.to_owned(), _lock: lock, journal, known, added: 0, remarks, was_cut })
     }
 
-    /// The folder.
     pub fn dir(&self) -> &Path {
         &self.dir
     }
@@ -117,7 +116,6 @@ impl Store {
         }
     }
 
-    /// Adds records.
     pub fn append(&mut self, records: &[Record]) -> Result<(), Failure> {
         self.added += records.len();
         Ok(self.journal.append(records)?)

@@ -11,10 +11,8 @@ use crate::args::{Global, MeshArgument, SubstrateArguments};
 use crate::exit::{Exit, Failure};
 use crate::files::{check_apart, check_output, left_out, shape_of};
 use crate::output::{StageCosts, counted, print_result};
-use crate::progress::StageLine;
 use crate::provenance::peak_bytes;
 
-/// Arguments of `axis`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
@@ -31,7 +29,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let options = arguments.substrate.shape_options()?;
     check_output(arguments.output.as_deref())?;
     check_apart(arguments.output.as_deref(), [&*arguments.mesh])?;
-    let line = StageLine::new(global.stages());
+    let line = global.stages();
     line.at("reading");
     let mut stages = StageCosts::default();
     let (input, shape) = stages.timed("read", || shape_of(&arguments.mesh, options))?;

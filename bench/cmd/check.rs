@@ -18,7 +18,6 @@ use crate::provenance::provenance;
 use crate::study::Study;
 use crate::study::registry::{Entry, Registry};
 
-/// Arguments of `check`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Methods [default: all, with plug-ins, but those that run on request].

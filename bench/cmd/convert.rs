@@ -16,7 +16,6 @@ use crate::exit::{Exit, Failure};
 use crate::files::{SURFACES, check_apart, check_extension, left_out, open_regular, shape_of};
 use crate::output::{counted, print_result};
 
-/// Arguments of `convert`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Surface (OFF, OBJ, PLY, STL), medial mesh (.ma and its dialects, .ply or .obj with radii), or list of spheres

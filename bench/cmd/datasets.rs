@@ -16,7 +16,6 @@ use crate::args::{Global, positive};
 use crate::exit::{Exit, Failure};
 use crate::output::{print_json, print_line, print_result};
 
-/// Arguments of `datasets`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     #[command(subcommand)]

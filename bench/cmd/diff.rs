@@ -23,7 +23,6 @@ use crate::store::{AXES, RESULTS, Store, claim, is_store, listed};
 use crate::study::Study;
 use crate::study::registry::Registry;
 
-/// Arguments of `diff`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Older results (a folder or its `results.jsonl`), or the older program with `--run`.
@@ -151,7 +150,7 @@ fn alternate(
             .iter()
             .any(|side| !side.store.missing(&side.supervisors[0].own(item), false).is_empty())
     });
-    let ended = run_items(&left, &mut sides, global.progress(), &mut |_| ());
+    let ended = run_items(&left, &mut sides, global.quiet, &mut |_| ());
     if interrupt::stop_listening() {
         print_error(
             "interrupted: recorded the finished results; run the same command again to resume",

@@ -21,7 +21,6 @@ use crate::progress::StageLine;
 use crate::study::edition::Edition;
 use crate::study::registry::Registry;
 
-/// Arguments of `evaluate`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
@@ -64,7 +63,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         Some(edition) => edition.description.judge_options(),
         None => arguments.measure.judge_options(arguments.seed),
     };
-    let line = StageLine::new(global.stages());
+    let line = global.stages();
     line.at("reading");
     let (input, shape) = shape_of(&arguments.mesh, ShapeOptions::default())?;
     line.at("preparing the surface");

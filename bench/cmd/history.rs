@@ -12,7 +12,6 @@ use crate::exit::{Exit, Failure};
 use crate::output::{note, print_json, print_markdown};
 use crate::store::RESULTS;
 
-/// Arguments of `history`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Folder of the history: one file for each run.

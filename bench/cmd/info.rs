@@ -9,7 +9,6 @@ use crate::args::{Global, MeshArgument};
 use crate::exit::{Exit, Failure};
 use crate::output::{note, print_json, print_line};
 
-/// Arguments of `info`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.

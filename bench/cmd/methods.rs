@@ -8,7 +8,6 @@ use crate::exit::{Exit, Failure};
 use crate::output::{print_json, print_line};
 use crate::study::registry::{Entry, Registry};
 
-/// Arguments of `methods`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Describe this method.

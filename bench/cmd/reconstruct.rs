@@ -17,10 +17,8 @@ use crate::args::{AxisArguments, Global, MeshArgument, SubstrateArguments, fract
 use crate::exit::{Exit, Failure};
 use crate::files::{SURFACES, check_apart, check_extension, check_folder, shape_of};
 use crate::output::{StageCosts, counted, print_result};
-use crate::progress::StageLine;
 use crate::provenance::peak_bytes;
 
-/// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Medial mesh (.ma, or .ply with radii) [default for the power crust: all inner poles of the surface].
@@ -78,7 +76,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         _ => {}
     }
     let mut stages = StageCosts::default();
-    let line = StageLine::new(global.stages());
+    let line = global.stages();
     line.at("reading");
     let (shape, spheres, mut warnings) = stages.timed("read", || read(arguments))?;
     line.at("making the surface");

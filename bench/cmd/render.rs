@@ -16,9 +16,7 @@ use crate::args::{AxisArguments, Global, MeshArgument, fraction, word};
 use crate::exit::{Exit, Failure};
 use crate::files::{self, check_extension, check_folder, shape_of};
 use crate::output::print_result;
-use crate::progress::StageLine;
 
-/// Arguments of `render`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
@@ -116,7 +114,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         Failure { code, message }
     };
     drawing.content(arguments.axes.len()).map_err(failed)?;
-    let line = StageLine::new(global.stages());
+    let line = global.stages();
     line.at("reading");
     let (input, shape) = shape_of(&arguments.mesh, ShapeOptions::default())?;
     let mut warnings = input.report.warnings;

@@ -11,7 +11,6 @@ use crate::exit::{Exit, Failure};
 use crate::files::{check_apart, check_folder};
 use crate::output::print_result;
 
-/// Arguments of `repair`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Surface (OFF, OBJ, PLY, STL).

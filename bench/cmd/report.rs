@@ -21,13 +21,12 @@ use crate::exit::{Exit, Failure};
 use crate::files;
 use crate::output::print_result;
 use crate::provenance::provenance;
-use crate::rebuild::{Rebuilt, STUDY, of_items, rebuild, records, write_site_of, write_study};
+use crate::rebuild::{Rebuilt, STUDY, of_items, rebuild, records, write_study};
 use crate::store::{AXES, PAGE, RESULTS, Store, artifact_path};
 use crate::study::edition::{Description, EditionMesh};
 use crate::study::registry::Registry;
 use crate::study::{Study, unique_names};
 
-/// Arguments of `report`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Stores: folders with `results.jsonl`.
@@ -63,16 +62,14 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     // While another process adds records, a page would be outdated at once.
     let held = (dir.is_dir() && !is_read).then(|| Store::open(dir, RESULTS, "medial report"));
     let held = held.transpose()?;
-    let mut page = dir.join(PAGE);
-    let mut rebuilt = if is_read { None } else { Some(rebuild(dir, registry)?) };
+    let mut rebuilt = if is_read { None } else { Some(rebuild(dir, None, registry)?) };
     if let Some(site) = &arguments.site {
         // Somebody else's index.html must not be replaced.
         let is_empty = fs::read_dir(site).map_or(true, |mut files| files.next().is_none());
         if !is_empty && !site.join("submissions.html").exists() {
             return Err(Failure::at(site, "not empty and no earlier site (expected a new folder)"));
         }
-        let of_site = write_site_of(dir, site, registry)?;
-        page = if is_read { site.join(PAGE) } else { page };
+        let of_site = rebuild(dir, Some(site), registry)?;
         rebuilt.get_or_insert(of_site);
     }
     let Rebuilt { records, files, mut warnings, undrawn } = rebuilt.expect("one of the two");
@@ -91,7 +88,8 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let without = records.iter().filter(|record| record.key.is_empty()).count();
     let count = keys.len() + without.saturating_sub(1);
     let object = json!({ "records": count, "files": files });
-    let text = format!("{count} records; page: {}", page.display());
+    let folder = arguments.site.as_ref().filter(|_| is_read).unwrap_or(dir);
+    let text = format!("{count} records; page: {}", folder.join(PAGE).display());
     Ok(print_result(global, &object, &text, &warnings))
 }
 

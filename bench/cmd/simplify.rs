@@ -19,10 +19,8 @@ use crate::args::{
 use crate::exit::{Exit, Failure};
 use crate::files::{check_apart, check_output, left_out, shape_of};
 use crate::output::{counted, print_result};
-use crate::progress::StageLine;
 use crate::study::registry::{DEFAULT, Entry, Registry};
 
-/// Arguments of `simplify`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Surface file (OFF, OBJ, PLY, STL), `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
@@ -69,7 +67,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     check_output(arguments.output.as_deref())?;
     let read = arguments.initial.iter().map(PathBuf::as_path).chain([&*arguments.mesh]);
     check_apart(arguments.output.as_deref(), read)?;
-    let line = StageLine::new(global.stages());
+    let line = global.stages();
     line.at("reading");
     let (input, mut shape) = shape_of(&arguments.mesh, options)?;
     if arguments.output.is_none() && !global.json {

@@ -15,7 +15,6 @@ use crate::exit::{Exit, Failure};
 use crate::files::{self, check_extension, check_folder};
 use crate::output::{counted, note, print_json, print_line};
 
-/// Arguments of `view`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Medial meshes in the same units.

@@ -41,7 +41,6 @@ pub struct Supervisor<'a> {
     program: Option<PathBuf>,
     plugins: Vec<PathBuf>,
     provenance: Provenance,
-    /// Folder for results as `.ma`.
     axes: Option<PathBuf>,
     /// Set when the user interrupts the run.
     interrupted: &'a AtomicBool,
@@ -60,7 +59,6 @@ type Repeated = (Target, Result<(Repetition, String), Fault>);
 enum Attempt {
     /// The worker finished the request.
     Finished,
-    /// The input is refused.
     Refused(String),
     /// The worker is gone.
     Ended(Stage, Fault),

@@ -25,28 +25,19 @@ const MAX_LINE_BYTES: u64 = 64 << 20;
 /// Version of this protocol: one more with each change of [`Request`] or [`Event`] that other builds cannot read.
 pub const PROTOCOL: u32 = 1;
 
-/// A request to a worker.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Request {
     /// Run all levels of an item, measure, and give records.
     Run {
-        /// The item.
         item: Item,
-        /// Folder for results as `.ma`.
         axes: Option<PathBuf>,
         /// The machine and the command, for the records.
         provenance: Box<Provenance>,
     },
     /// Prepare the method of an item on a very small shape, to check its parameters.
-    Probe {
-        /// The item.
-        item: Item,
-    },
+    Probe { item: Item },
     /// Time all levels of an item once more.
-    Again {
-        /// The item.
-        item: Item,
-    },
+    Again { item: Item },
     /// Run one case of the conformance corpus on a method.
     Check(CheckItem),
 }
@@ -74,17 +65,13 @@ impl Request {
 /// One case of the conformance corpus on one method.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CheckItem {
-    /// The method.
     pub method: MethodSpec,
-    /// Name of the case.
     pub case: String,
-    /// Number of threads.
     pub threads: usize,
     /// The limits at which the case is killed.
     pub limits: Limits,
 }
 
-/// A message from a worker.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Event {
     /// The first event of a worker: its [`PROTOCOL`].
@@ -94,23 +81,19 @@ pub enum Event {
     /// The method simplifies to a level, or searches the fewest spheres within a bound.
     #[serde(rename = "Asked")]
     Simplifying(Target),
-    /// The results are being measured.
     Measuring,
     /// The reason for which the input is refused.
     Refused(String),
     /// The reason for which the method rejects its parameters.
     WrongParameter(String),
-    /// The record of a level.
     Record(Box<Record>),
     /// The times of a repetition of a level, and a hash of its result.
     Repeated(Target, Result<(Repetition, String), Fault>),
     /// A case of the conformance corpus has reached this step.
     Doing(String),
-    /// The outcome of the case.
     Checked(Outcome),
     /// The system has refused memory to the worker, which may end because of it.
     OutOfMemory,
-    /// The request is done.
     Finished,
 }
 

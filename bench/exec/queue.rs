@@ -21,7 +21,7 @@ use medial_run::record::{Record, Status};
 
 use crate::exec::{Supervisor, merge};
 use crate::exit::Failure;
-use crate::progress::{Progress, Verbosity};
+use crate::progress::Progress;
 use crate::provenance::provenance;
 use crate::store::Store;
 
@@ -68,7 +68,7 @@ pub fn refused_params(
 pub fn run_items(
     items: &[Item],
     sides: &mut [Contender<'_>],
-    verbosity: Verbosity,
+    is_quiet: bool,
     on_recorded: &mut (dyn FnMut(&[&Item]) + Send),
 ) -> Result<(), Failure> {
     let (mut lanes, mut stores): (Vec<Lane<'_, '_>>, _) = (Vec::new(), Vec::new());
@@ -84,7 +84,7 @@ pub fn run_items(
         batches: items.chunk_by(takes_turns).enumerate().collect(),
         waiting: items.iter().collect(),
         stores,
-        progress: Progress::new(verbosity, turns.collect(), lanes.len()),
+        progress: Progress::new(is_quiet, turns.collect(), lanes.len()),
         on_recorded,
     });
     thread::scope(|scope| {
@@ -193,7 +193,6 @@ pub fn count(records: &[Record], status: Status) -> usize {
 /// A build of the program.
 #[derive(Clone, Debug)]
 pub struct Build {
-    /// The program file.
     pub program: PathBuf,
     /// The origin of its records.
     pub provenance: Provenance,
@@ -229,6 +228,5 @@ impl Build {
 pub struct Contender<'a> {
     /// Its supervisors, all of one build: the number of items that run at the same time.
     pub supervisors: Vec<Supervisor<'a>>,
-    /// The store of its records.
     pub store: Store,
 }

@@ -22,15 +22,12 @@ const LONGEST_DRAIN: Duration = Duration::from_secs(5);
 pub struct WorkerOptions {
     /// The program; the running one unless given.
     pub program: Option<PathBuf>,
-    /// Threads of its pool.
     pub threads: usize,
     /// Limit of memory, in bytes.
     pub bytes: u64,
-    /// Plug-in files.
     pub plugins: Vec<PathBuf>,
 }
 
-/// A running worker.
 pub struct Worker {
     child: Child,
     tree: Tree,
@@ -86,7 +83,6 @@ impl Worker {
         })
     }
 
-    /// Sends a request.
     pub fn send(&mut self, request: &Request) -> io::Result<()> {
         let requests = self.requests.as_mut().ok_or(io::ErrorKind::BrokenPipe)?;
         let mut line = serde_json::to_vec(request)?;

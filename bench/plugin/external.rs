@@ -25,7 +25,7 @@ use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
 use super::declaration::{Declaration, LevelKind, OutputUnits, Word};
-use super::program::{self, Ended, NoEnd};
+use super::program::{self, Ended};
 use crate::process_tree::ending_signal;
 
 /// Environment variable with the folder of temporary folders.
@@ -172,14 +172,9 @@ impl Simplification for PreparedProgram<'_> {
             }
             _ => {}
         }
-        let ended = match program::run(self.command(level, &output), &self.run) {
-            Ok(ended) => ended,
-            Err(NoEnd::Cancelled) => return Err(SimplifyError::Cancelled),
-            Err(NoEnd::System(error)) => {
-                let program = self.declaration.program.display();
-                return Err(cannot(&format!("run {program}"), error));
-            }
-        };
+        let ended = program::run(self.command(level, &output), &self.run)
+            .map_err(|error| cannot(&format!("run {}", self.declaration.program.display()), error));
+        let ended = ended?.ok_or(SimplifyError::Cancelled)?;
         check_status(&self.declaration.id, ended.status, &ended.stderr)?;
         self.result(level, &output, &ended)
     }

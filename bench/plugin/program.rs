@@ -40,21 +40,6 @@ pub(super) struct Ended {
     pub orphans: usize,
 }
 
-/// The reason for a run without an exit status.
-#[derive(Debug)]
-pub(super) enum NoEnd {
-    /// It cannot be started or waited for.
-    System(io::Error),
-    /// The run was cancelled, and the program with all its descendants ended.
-    Cancelled,
-}
-
-impl From<io::Error> for NoEnd {
-    fn from(error: io::Error) -> Self {
-        Self::System(error)
-    }
-}
-
 /// Lifts the limit of memory that a program inherits from its worker.
 // The supervisor limits both together by their resident bytes: the message of a program after a
 // failed allocation is irrelevant.
@@ -70,8 +55,8 @@ fn lift_limit(child: &Child) {
     let _ = child;
 }
 
-/// Runs a program to its end.
-pub(super) fn run(mut command: Command, context: &RunContext) -> Result<Ended, NoEnd> {
+/// Runs a program to its end; `None` if the run was cancelled, and the program with all its descendants ended.
+pub(super) fn run(mut command: Command, context: &RunContext) -> io::Result<Option<Ended>> {
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -81,36 +66,35 @@ pub(super) fn run(mut command: Command, context: &RunContext) -> Result<Ended, N
     lift_limit(&child);
     let stdout = child.stdout.take().map(Drain::start);
     let stderr = child.stderr.take().map(Drain::start);
-    let (status, peak) = match watch(&mut child, &mut tree, context) {
-        Ok(watched) => watched,
-        Err(none) => {
-            // The child would outlive the error otherwise, and hold the scratch folder.
-            tree.end(&mut child);
-            return Err(none);
-        }
+    let watched = watch(&mut child, &mut tree, context);
+    let Ok(Some((status, peak))) = watched else {
+        // The child would outlive the error otherwise, and hold the scratch folder.
+        tree.end(&mut child);
+        return watched.map(|_| None);
     };
     // Before the outputs are read: an orphan with an open pipe would block them.
     let orphans = tree.end_orphans();
     let deadline = Instant::now() + LONGEST_DRAIN;
     let [stdout, stderr] = [stdout, stderr].map(|drain| drain.map(|drain| drain.finish(deadline)));
     let (stdout, stderr) = (stdout.unwrap_or_default(), stderr.unwrap_or_default());
-    Ok(Ended { status, stdout, stderr, peak, orphans })
+    Ok(Some(Ended { status, stdout, stderr, peak, orphans }))
 }
 
+/// The status and the peak of memory of a program; `None` if the run was cancelled.
 fn watch(
     child: &mut Child,
     tree: &mut Tree,
     context: &RunContext,
-) -> Result<(ExitStatus, u64), NoEnd> {
+) -> io::Result<Option<(ExitStatus, u64)>> {
     let (mut peak, mut pause) = (0, FIRST_PAUSE);
     loop {
         // Before the status: the memory of an ended process cannot be read.
         peak = peak.max(tree.resident_bytes());
         if let Some(status) = child.try_wait()? {
-            return Ok((status, peak));
+            return Ok(Some((status, peak)));
         }
         if context.is_cancelled() {
-            return Err(NoEnd::Cancelled);
+            return Ok(None);
         }
         thread::sleep(pause);
         // Short programs are timed well, long ones are not disturbed.

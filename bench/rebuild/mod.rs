@@ -37,9 +37,7 @@ pub const STUDY: &str = "study.toml";
 
 /// A report that was rebuilt or is up to date.
 pub struct Rebuilt {
-    /// The records.
     pub records: Vec<Record>,
-    /// The files that were written.
     pub files: Vec<PathBuf>,
     /// Lines without a record.
     pub warnings: Vec<String>,
@@ -47,13 +45,13 @@ pub struct Rebuilt {
     pub undrawn: Vec<String>,
 }
 
-/// Rebuilds the report of a folder from its files. Fails when the folder has no readable record, or the report cannot
-/// be written.
-pub fn rebuild(dir: &Path, registry: &Registry) -> Result<Rebuilt, Failure> {
+/// Rebuilds the report of a store from its files, in its folder, or as a static site in another one while the store stays
+/// unchanged. Fails when the store has no readable record, or the report cannot be written.
+pub fn rebuild(dir: &Path, site: Option<&Path>, registry: &Registry) -> Result<Rebuilt, Failure> {
     let (records, warnings) = some_records(dir)?;
     let header = header(dir, &records, registry, &warnings);
     let items = items_of(dir, registry);
-    write(dir, (records, warnings), (&items, registry), &header, true)
+    write([dir, site.unwrap_or(dir)], (records, warnings), (&items, registry), header, true)
 }
 
 /// The records of a store, at least one, and warnings about lines without a record.
@@ -67,18 +65,6 @@ fn some_records(dir: &Path) -> Result<(Vec<Record>, Vec<String>), Failure> {
         return Err(Failure { code: Exit::NothingMeasured, message });
     }
     Ok((records, warnings))
-}
-
-/// Writes the static site of a store, which stays unchanged, into a folder. Fails when the store has no readable record,
-/// or the site cannot be written.
-pub fn write_site_of(dir: &Path, site: &Path, registry: &Registry) -> Result<Rebuilt, Failure> {
-    let (records, warnings) = some_records(dir)?;
-    let header = header(dir, &records, registry, &warnings);
-    let (records, shown, header) =
-        arranged(dir, records, (&items_of(dir, registry), registry), &header);
-    let undrawn = pictures::draw([dir, site], &shown, &sources(dir));
-    let files = write_site(site, dir, &shown, &header).map_err(Failure::input)?;
-    Ok(Rebuilt { records, files, warnings, undrawn })
 }
 
 /// The items of the study of a store.
@@ -97,15 +83,12 @@ fn sources(dir: &Path) -> Vec<Source> {
 
 /// The report of a run of `compare`, during the run and after it.
 pub struct RunReport<'a> {
-    /// The folder.
     pub dir: &'a Path,
-    /// The methods.
     pub registry: &'a Registry,
     /// The origin of the new records.
     pub provenance: &'a Provenance,
     /// The items of the run, in the order of the tables.
     pub items: &'a [Item],
-    /// Whether it adds records.
     pub adds: bool,
 }
 
@@ -129,37 +112,23 @@ impl RunReport<'_> {
             let now = jiff::Timestamp::now().to_zoned(TimeZone::UTC);
             run.date.get_or_insert_with(|| now.date().to_string());
         }
-        write(self.dir, (records, warnings), (self.items, self.registry), &header, draws)
+        let dirs = [self.dir; 2];
+        write(dirs, (records, warnings), (self.items, self.registry), header, draws)
     }
 }
 
+/// Writes the report of a store into a folder: that of the store, or another one for a site.
 fn write(
-    dir: &Path,
-    (records, warnings): (Vec<Record>, Vec<String>),
-    items: (&[Item], &Registry),
-    header: &Header,
+    [dir, to]: [&Path; 2],
+    (mut records, warnings): (Vec<Record>, Vec<String>),
+    (items, registry): (&[Item], &Registry),
+    mut header: Header,
     draws: bool,
 ) -> Result<Rebuilt, Failure> {
-    let (records, shown, header) = arranged(dir, records, items, header);
-    // Pictures of inputs that can no longer be read stay unchanged.
-    let undrawn =
-        if draws { pictures::draw([dir, dir], &shown, &sources(dir)) } else { Vec::new() };
-    let files = write_report(dir, &shown, &header)?;
-    Ok(Rebuilt { records, files, warnings, undrawn })
-}
-
-/// The records in the order of the study, those of the report, with an edition's, and the header with notes on these.
-fn arranged(
-    dir: &Path,
-    mut records: Vec<Record>,
-    (items, registry): (&[Item], &Registry),
-    header: &Header,
-) -> (Vec<Record>, Vec<Record>, Header) {
     // Tables follow the order of the records: that of the study, not that of the runs.
     let order = positions(items);
     records.sort_by_key(|record| order.get(&row_of(record)).copied().unwrap_or(usize::MAX));
     let study = Study::read(&dir.join(STUDY)).ok();
-    let mut header = header.clone();
     let mixed = study.and_then(|study| match Edition::of(&study) {
         Ok(edition) => Some(edition?.beside(&study, &records, registry)),
         // The own results do not depend on it.
@@ -170,7 +139,13 @@ fn arranged(
     });
     header.notes.extend(mixed.iter().flat_map(|mixed| mixed.notes.clone()));
     let shown = mixed.map_or_else(|| records.clone(), |mixed| mixed.records);
-    (records, shown, header)
+    // Pictures of inputs that can no longer be read stay unchanged.
+    let undrawn = if draws { pictures::draw([dir, to], &shown, &sources(dir)) } else { Vec::new() };
+    let files = match dir == to {
+        true => write_report(dir, &shown, &header)?,
+        false => write_site(to, dir, &shown, &header)?,
+    };
+    Ok(Rebuilt { records, files, warnings, undrawn })
 }
 
 /// The fields that decide the position of a record in its study: mesh, method with parameters, level.
