@@ -44,7 +44,7 @@ mod view3d;
 mod write;
 
 pub use header::{Header, MethodNote, RunNote, Running};
-pub use metric::{Better, METRICS, Metric, measured_rows};
+pub use metric::measured_rows;
 pub use overview::{reasons, summary_text};
 pub use pictures::{PictureStrip, picture_strips};
 pub use site::write_site;

@@ -7,7 +7,7 @@
 //! | [`axis`] | a medial mesh that a user names, in any unit |
 //! | [`settings`], [`level`] | all that decides a result except input and method |
 //! | [`item`], [`scene`] | one method on one input as data, and what its levels share |
-//! | [`timed`], [`search`] | the timed run, the search for an error bound |
+//! | [`timed`], `search` | the timed run, the search for an error bound |
 //! | [`outcome`], [`record`], [`journal`] | from a result to a line of `results.jsonl` |
 //! | [`simplify`], [`evaluate`], [`reconstruct`] | the work of three verbs |
 //! | [`hash`], [`text`] | hashes, numbers and names as text |
@@ -25,7 +25,7 @@ pub mod outcome;
 pub mod reconstruct;
 pub mod record;
 pub mod scene;
-pub mod search;
+mod search;
 pub mod settings;
 pub mod simplify;
 pub mod text;
