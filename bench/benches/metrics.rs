@@ -5,11 +5,10 @@ mod plan;
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use medial::complex::{MedialMesh, MedialUnion, betti};
-use medial::metrics::{JudgeOptions, VolumeOptions, spikes, triangle_quality, volume_error};
+use medial::complex::{MedialMesh, betti};
+use medial::metrics::{JudgeOptions, spikes, triangle_quality};
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, Params, RunContext};
-use medial::surface::Side;
 use medial_run::input::{Input, Source};
 
 /// Surface samples, and about as many of the union: as `medial compare` takes.
@@ -33,14 +32,11 @@ fn results() -> (Shape, Vec<MedialMesh>) {
 
 fn metrics(criterion: &mut Criterion) {
     let (shape, meshes) = results();
-    let tree = shape.surface_tree().expect("the shape has faces");
-    let inside = shape.inside_test();
     let options =
         JudgeOptions { samples: SAMPLES, volume_depth: VOLUME_DEPTH, ..JudgeOptions::default() };
     let judge = shape.judge(None, options).expect("the shape has faces");
     for mesh in &meshes {
         let count = mesh.spheres.len();
-        let union = MedialUnion::new(mesh).expect("has spheres");
         let name = |what| BenchmarkId::new(what, format!("{count} spheres"));
         let mut group = criterion.benchmark_group("metrics");
         group.bench_function(name("everything"), |b| b.iter(|| judge.evaluate(black_box(mesh))));
@@ -48,9 +44,7 @@ fn metrics(criterion: &mut Criterion) {
             b.iter(|| judge.distances(black_box(mesh)));
         });
         group.bench_function(name("volume"), |b| {
-            let options = VolumeOptions { depth: VOLUME_DEPTH, seed: 0 };
-            let inside = |p| inside.side(p) == Side::Inside;
-            b.iter(|| volume_error(shape.mesh(), &tree, inside, black_box(&union), &options));
+            b.iter(|| judge.volume_error(black_box(mesh)));
         });
         group.bench_function(name("topology"), |b| b.iter(|| betti(black_box(mesh))));
         group.bench_function(name("quality and spikes"), |b| {

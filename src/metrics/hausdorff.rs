@@ -38,63 +38,26 @@ use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion};
 use crate::surface::{TriMesh, TriangleBvh};
 
-/// How densely to sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct DistanceOptions {
-    /// Area-uniform samples on the surface; its vertices come on top.
-    pub surface_samples: usize,
-    /// Approximate number of samples on the boundary of the union.
-    pub envelope_samples: usize,
-    /// Seed of both.
-    pub seed: u64,
-}
-
-/// Distances between the surface `surface`, whose faces are in `bvh`, and the union of the
-/// primitives of `mesh`, in the unit of both.
-///
-/// The result is the same for any number of threads.
-///
-/// # Errors
-/// When the medial mesh is empty or not valid, the surface has no area, or no samples are requested.
-///
-/// # Panics
-/// If a face of `surface` names a vertex that does not exist.
-pub fn distances(
-    surface: &TriMesh,
-    bvh: &TriangleBvh,
-    mesh: &MedialMesh,
-    options: &DistanceOptions,
-) -> Result<Distances, MetricError> {
-    let samples = SurfaceSamples::new(surface, options.surface_samples, options.seed)?;
-    let (mesh, union) = samples.ordered(mesh)?;
-    let (distances, _) = distances_with_envelope((surface, bvh), &mesh, &union, &samples, options)?;
-    Ok(distances)
-}
-
 /// Samples of the boundary of a union, with their distances from the surface.
 pub(super) struct Envelope {
     pub points: Vec<Vec3>,
     pub distances: Vec<f64>,
 }
 
-/// As [`distances`], with the samples of the reverse distance; `union` is that of `mesh`, whose spheres
-/// are in the order of the samples' pose.
+/// Distances between a surface, whose faces are in `bvh`, and the union of the primitives of `mesh`, in the unit of both,
+/// with the samples of the reverse distance, about `count` of them. The spheres of the mesh are in the order of the
+/// samples' pose. The result is the same for any number of threads.
 pub(super) fn distances_with_envelope(
     (surface, bvh): (&TriMesh, &TriangleBvh),
-    mesh: &MedialMesh,
-    union: &MedialUnion,
+    (mesh, union): (&MedialMesh, &MedialUnion),
     samples: &SurfaceSamples,
-    options: &DistanceOptions,
+    (count, seed): (usize, u64),
 ) -> Result<(Distances, Envelope), MetricError> {
     let pose = &samples.pose;
     let patches = Patches::new(mesh, pose.axes(), pose.diameter());
     let mut boundary = Boundary::new(union, patches);
     let (depths, mu): (Vec<_>, Vec<_>) = boundary.readings(&samples.points).into_iter().unzip();
-    let envelope = EnvelopeOptions {
-        samples: options.envelope_samples,
-        burial: BURIAL * pose.diameter(),
-        seed: options.seed,
-    };
+    let envelope = EnvelopeOptions { samples: count, burial: BURIAL * pose.diameter(), seed };
     let sampled = sample_envelope_in(pose, mesh, union, &envelope)?;
     let depths = boundary.values(&samples.points, &depths, &sampled.points);
     let balls = MedialUnion::of_spheres(&mesh.spheres)?;

@@ -9,15 +9,15 @@ use super::cover::CoverTest;
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::error::MetricError;
 use super::evaluation::{Certificate, Cover, Distances, Evaluation, MeanAndP95, SheetDifference};
-use super::hausdorff::{DistanceOptions, distances_with_envelope};
+use super::hausdorff::distances_with_envelope;
 use super::quality::{counts, triangle_quality};
 use super::samples::{Pose, SurfaceSamples};
 use super::spikes::{centres_outside, protrusion, spikes};
 use super::structure::{StructureSurface, sheet_difference};
 use super::union_topology::topology_warning;
-use super::volume::{Sides, VolumeOptions, Volumes, box_in, volumes_in};
+use super::volume::{Sides, Volumes, volumes};
 use crate::complex::{MedialMesh, MedialUnion, betti, euler};
-use crate::surface::{InsideTest, Side, SignedDistance, TriMesh, TriangleBvh};
+use crate::surface::{InsideTest, SignedDistance, TriMesh, TriangleBvh};
 
 /// Mean error, as a fraction of the diagonal, above which radii that do not fit the surface cause a warning. A result with
 /// a smaller error is right, for any radii.
@@ -105,20 +105,15 @@ impl Judge {
         // In the order of the pose, since random numbers and sums follow the order of the spheres.
         let samples = self.samples()?;
         let (mesh, union) = &samples.ordered(mesh)?;
-        let options = self.distance_options();
+        let JudgeOptions { samples: count, seed, .. } = self.options;
         let prepared = &PreparedAxis::new(mesh)?;
         // In parallel with each other, because each has serial parts.
         let ((distances, volumes), (axis, (quality, spikes, betti, structure))) = rayon::join(
             || {
                 rayon::join(
                     || {
-                        distances_with_envelope(
-                            (&self.surface, &self.tree),
-                            mesh,
-                            union,
-                            samples,
-                            &options,
-                        )
+                        let surface = (&self.surface, &*self.tree);
+                        distances_with_envelope(surface, (mesh, union), samples, (count, seed))
                     },
                     || self.volumes(mesh, union, &samples.pose),
                 )
@@ -128,8 +123,7 @@ impl Judge {
                     || {
                         let truth = self.true_axis.as_ref()?;
                         let truth = truth.as_ref().map_err(Clone::clone);
-                        let JudgeOptions { samples, seed, .. } = self.options;
-                        Some(truth.and_then(|truth| prepared.distances(truth, samples, seed)))
+                        Some(truth.and_then(|truth| prepared.distances(truth, count, seed)))
                     },
                     || {
                         let betti = betti(mesh);
@@ -180,28 +174,30 @@ impl Judge {
         })
     }
 
-    /// The distances alone.
+    /// The distances alone, in the unit of the surface.
     ///
     /// # Errors
     /// As [`Judge::evaluate`].
     pub fn distances(&self, mesh: &MedialMesh) -> Result<Distances, MetricError> {
         let samples = self.samples()?;
         let (mesh, union) = samples.ordered(mesh)?;
-        let options = self.distance_options();
+        let JudgeOptions { samples: count, seed, .. } = self.options;
         let surface = (&self.surface, &*self.tree);
-        Ok(distances_with_envelope(surface, &mesh, &union, samples, &options)?.0)
+        Ok(distances_with_envelope(surface, (&mesh, &union), samples, (count, seed))?.0)
+    }
+
+    /// Volume of the symmetric difference of solid and union, over the solid's volume; `None` if the options skip it.
+    ///
+    /// # Errors
+    /// As [`Judge::evaluate`], and when the surface does not enclose a positive volume.
+    pub fn volume_error(&self, mesh: &MedialMesh) -> Result<Option<f64>, MetricError> {
+        let samples = self.samples()?;
+        let (mesh, union) = samples.ordered(mesh)?;
+        Ok(self.volumes(&mesh, &union, &samples.pose)?.map(|volumes| volumes.error))
     }
 
     fn samples(&self) -> Result<&SurfaceSamples, MetricError> {
         self.samples.as_ref().map_err(Clone::clone)
-    }
-
-    fn distance_options(&self) -> DistanceOptions {
-        DistanceOptions {
-            surface_samples: self.options.samples,
-            envelope_samples: self.options.samples,
-            seed: self.options.seed,
-        }
     }
 
     /// An interval no wider than `tolerance` that holds the Hausdorff distance of
@@ -291,15 +287,14 @@ impl Judge {
         if self.options.volume_depth == 0 {
             return Ok(None);
         }
-        let options = VolumeOptions { depth: self.options.volume_depth, seed: self.options.seed };
         let sides = Sides {
             surface: &self.surface,
             bvh: &self.tree,
+            inside: &self.inside,
+            balls: &mesh.spheres,
             union,
-            inside: |p| self.inside.side(p) == Side::Inside,
         };
-        let bounds = box_in(pose, &self.surface, &mesh.spheres);
-        volumes_in(pose, bounds, &sides, &options).map(Some)
+        volumes(pose, &sides, self.options.volume_depth, self.options.seed).map(Some)
     }
 
     /// Signs that the medial mesh does not belong to this surface: some published files have wrong

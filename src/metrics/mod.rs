@@ -38,11 +38,10 @@ pub use evaluation::{
     Distances, Evaluation, Features, GraphSizes, MeanAndP95, OneSided, Outside, RatioSpikes,
     SheetDifference, Spikes, Structure, TriangleQuality, Witness, WitnessSide,
 };
-pub use hausdorff::{DistanceOptions, distances};
 pub use judge::{Judge, JudgeOptions, Truth};
-pub use peaks::{PeakSearch, Peaks};
+pub use peaks::{DistanceOptions, PeakSearch, Peaks};
 pub use quality::{counts, triangle_quality};
 pub use spikes::{FIN_ANGLE, IDLE_PROTRUSION, RATIO_THRESHOLDS, SPIKE_ANGLE, spikes};
 pub use structure::{CONTACT, REACHED, SHARP_ANGLE, StructureSurface};
 pub use union_topology::{topology_warning, union_betti};
-pub use volume::{VolumeOptions, enclosed_volume, volume_error};
+pub use volume::enclosed_volume;

@@ -4,7 +4,6 @@ use super::ascent::{OnMesh, OnUnion, Peak, SEEDS, Start, ascend};
 use super::depth::Boundary;
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::error::MetricError;
-use super::hausdorff::DistanceOptions;
 use super::pieces::{BURIAL, Patches};
 use super::samples::SurfaceSamples;
 use super::sweep::swept;
@@ -34,6 +33,17 @@ impl Peaks {
     }
 }
 
+/// How densely to sample both surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DistanceOptions {
+    /// Area-uniform samples on the surface; its vertices come on top.
+    pub surface_samples: usize,
+    /// Approximate number of samples on the boundary of the union.
+    pub envelope_samples: usize,
+    /// Seed of both.
+    pub seed: u64,
+}
+
 /// A surface whose samples are laid out once, to be searched with many medial meshes.
 pub struct PeakSearch<'a> {
     surface: &'a TriMesh,
@@ -59,7 +69,7 @@ impl<'a> PeakSearch<'a> {
     /// The samples with the largest distances, and the points that local ascent reaches from them. If none of them is
     /// at least `swept_below` away, both surfaces are swept for larger distances.
     ///
-    /// The distances are those of [`crate::metrics::distances`], whose maximum also counts an ascent of `mu` and
+    /// The distances are those of [`Judge::distances`](super::Judge::distances), whose maximum also counts an ascent of `mu` and
     /// can be a little larger.
     ///
     /// # Errors
@@ -115,7 +125,8 @@ fn sorted(peaks: Vec<Peak>, points: &[Vec3], values: &[f64]) -> Vec<Peak> {
 mod tests {
     use super::*;
     use crate::complex::Sphere;
-    use crate::metrics::distances;
+    use crate::metrics::{Judge, JudgeOptions, Truth};
+    use crate::surface::InsideTest;
     use crate::surface::fixtures::cuboid;
 
     #[test]
@@ -133,7 +144,11 @@ mod tests {
         let corner = Vec3::new(0.5, 0.5, 0.6).length() - 0.5;
         assert!((peaks.forward[0].distance - corner).abs() < 1e-12, "{:?}", peaks.forward[0]);
         assert_eq!(peaks.forward[0].point.z, 1.0);
-        let measured = distances(&surface, &tree, &mesh, &options).unwrap();
+        let options = JudgeOptions { samples: 500, volume_depth: 0, seed: 3 };
+        let inside = InsideTest::new(&surface).into();
+        let judge =
+            Judge::new(surface.clone(), tree.clone().into(), inside, Truth::default(), options);
+        let measured = judge.distances(&mesh).unwrap();
         assert!((peaks.hausdorff() - measured.hausdorff).abs() < 1e-9);
         assert_eq!(peaks.reverse[0].distance, measured.reverse);
         let descends = |peaks: &[Peak]| peaks.is_sorted_by(|a, b| a.distance >= b.distance);

@@ -1,9 +1,8 @@
 //! Volume of the symmetric difference between a solid and the union of its medial primitives.
 //!
-//! 1. A box around both, along the coordinate axes or (for [`super::Judge`]) those of the pose, is
-//!    divided into cells. A cell that neither the surface nor the boundary of the union reaches is
-//!    wholly inside the difference or wholly outside. One query at its centre decides this, because
-//!    distances are 1-Lipschitz. Other cells are divided into eight.
+//! 1. A box around both, along the axes of the pose, is divided into cells. A cell that neither the surface
+//!    nor the boundary of the union reaches is wholly inside the difference or wholly outside. One query at
+//!    its centre decides this, because distances are 1-Lipschitz. Other cells are divided into eight.
 //! 2. At the finest level each cell is decided by one random point.
 //!
 //! Only a shell around the two boundaries is ever refined, so the finest cells are those of a
@@ -20,23 +19,7 @@ use crate::complex::MedialUnion;
 use crate::geometry::Sphere;
 use crate::geometry::hash::splitmix;
 use crate::sum::Sum;
-use crate::surface::TriMesh;
-use crate::surface::TriangleBvh;
-
-/// How finely to divide space.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct VolumeOptions {
-    /// Levels of division: the finest cells have `2^-depth` of the side of the box.
-    pub depth: u32,
-    /// Seed of the random points.
-    pub seed: u64,
-}
-
-impl Default for VolumeOptions {
-    fn default() -> Self {
-        Self { depth: 7, seed: 0 }
-    }
-}
+use crate::surface::{InsideTest, Side, TriMesh, TriangleBvh};
 
 /// Levels that are divided first, on one thread, into `8^COARSE` independent tasks.
 const COARSE: u32 = 2;
@@ -59,28 +42,6 @@ pub fn enclosed_volume(surface: &TriMesh) -> f64 {
     six_times.value() / 6.0
 }
 
-/// Volume of the symmetric difference of the solid and the union, over the solid's volume.
-///
-/// `inside` tests whether a point lies in the solid that `surface` bounds, whose faces are in
-/// `bvh`. The same number comes out for any number of threads.
-///
-/// # Errors
-/// When the surface does not enclose a positive volume.
-pub fn volume_error(
-    surface: &TriMesh,
-    bvh: &TriangleBvh,
-    inside: impl Fn(Vec3) -> bool + Sync,
-    union: &MedialUnion,
-    options: &VolumeOptions,
-) -> Result<f64, MetricError> {
-    let mut bounds = union.bounding_box();
-    if let Some((lo, hi)) = surface.bounding_box() {
-        bounds = (bounds.0.min(lo), bounds.1.max(hi));
-    }
-    let sides = Sides { surface, bvh, union, inside };
-    Ok(volumes_in(&Pose::coordinates(), bounds, &sides, options)?.error)
-}
-
 /// Volumes relative to that of the solid.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Volumes {
@@ -91,7 +52,7 @@ pub(super) struct Volumes {
 }
 
 /// The box around a surface and balls in the coordinates of a pose.
-pub(super) fn box_in(pose: &Pose, surface: &TriMesh, balls: &[Sphere]) -> (Vec3, Vec3) {
+fn box_in(pose: &Pose, surface: &TriMesh, balls: &[Sphere]) -> (Vec3, Vec3) {
     let points = surface.vertices.iter().map(|&v| (pose.local(v), 0.0));
     let balls = balls.iter().map(|ball| (pose.local(ball.centre), ball.radius));
     points.chain(balls).fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), (p, r)| {
@@ -100,29 +61,34 @@ pub(super) fn box_in(pose: &Pose, surface: &TriMesh, balls: &[Sphere]) -> (Vec3,
 }
 
 /// A solid and a union that are compared.
-pub(super) struct Sides<'a, F> {
+pub(super) struct Sides<'a> {
     pub surface: &'a TriMesh,
     pub bvh: &'a TriangleBvh,
+    pub inside: &'a InsideTest,
+    /// The spheres of the union.
+    pub balls: &'a [Sphere],
     pub union: &'a MedialUnion,
-    /// Whether a point lies in the solid.
-    pub inside: F,
 }
 
-/// As [`volume_error`], by cells along the axes of `pose` in the box `bounds` of its coordinates.
-pub(super) fn volumes_in(
+/// The volumes, by cells along the axes of `pose`, of which the finest have `2^-depth` of the side of a box around both. The
+/// same for any number of threads.
+///
+/// # Errors
+/// When the surface does not enclose a positive volume.
+pub(super) fn volumes(
     pose: &Pose,
-    bounds: (Vec3, Vec3),
-    sides: &Sides<'_, impl Fn(Vec3) -> bool + Sync>,
-    options: &VolumeOptions,
+    sides: &Sides<'_>,
+    depth: u32,
+    seed: u64,
 ) -> Result<Volumes, MetricError> {
     let volume = enclosed_volume(sides.surface);
     if !(volume > 0.0 && volume.is_finite()) {
         return Err(MetricError::NoVolume(volume));
     }
-    let (lo, hi) = bounds;
-    let division = Division { pose, sides, depth: options.depth, seed: options.seed };
+    let (lo, hi) = box_in(pose, sides.surface, sides.balls);
+    let division = Division { pose, sides, depth, seed };
     let root = Cell { lo, size: hi - lo, level: 0, path: 1 };
-    let coarse = (0..options.depth.min(COARSE))
+    let coarse = (0..depth.min(COARSE))
         .fold(vec![root], |cells, _| cells.iter().flat_map(Cell::children).collect());
     let parts: Vec<Parts> = coarse.par_iter().map(|cell| division.difference(cell)).collect();
     let Parts { all, excess } = parts.into_iter().fold(Parts::default(), Parts::plus);
@@ -173,24 +139,25 @@ impl Parts {
     }
 }
 
-struct Division<'a, F> {
+struct Division<'a> {
     pose: &'a Pose,
-    sides: &'a Sides<'a, F>,
+    sides: &'a Sides<'a>,
     depth: u32,
     seed: u64,
 }
 
-impl<F: Fn(Vec3) -> bool> Division<'_, F> {
+impl Division<'_> {
     /// The part of the difference in a cell.
     fn difference(&self, cell: &Cell) -> Parts {
         let Sides { bvh, union, inside, .. } = self.sides;
+        let is_inside = |p| inside.side(p) == Side::Inside;
         if cell.level >= self.depth {
             // A generator per cell: whether a boundary just touches another cell is up to rounding,
             // and must not change the random numbers of this one.
             let mut rng = Pcg64::seed_from_u64(splitmix(self.seed) ^ cell.path);
             let jitter = Vec3::new(rng.random(), rng.random(), rng.random());
             let point = self.pose.world(cell.lo + jitter * cell.size);
-            return cell.part(inside(point), union.buries(point, 0.0));
+            return cell.part(is_inside(point), union.buries(point, 0.0));
         }
         let (centre, reach) = (cell.lo + cell.size * 0.5, cell.size.length() * 0.5);
         let centre = self.pose.world(centre);
@@ -199,7 +166,7 @@ impl<F: Fn(Vec3) -> bool> Division<'_, F> {
         if !bvh.any_within(centre, reach) {
             let covered = union.buries(centre, reach);
             if covered || !union.buries(centre, -reach) {
-                return cell.part(inside(centre), covered);
+                return cell.part(is_inside(centre), covered);
             }
         }
         let parts = cell.children().map(|child| self.difference(&child));

@@ -265,8 +265,7 @@ fn random_solids_of_boxes_have_their_topology() {
 fn threads_order_scale_and_rotation_keep_the_topology() {
     let mesh = shapes::moved(bent_plate(), |p| Vec3::new(p.x + 3.0 * p.y, p.y + p.z, p.z));
     let start = |mesh: &TriMesh, threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| right_start("bent plate", mesh))
+        crate::on_threads(threads, || right_start("bent plate", mesh))
     };
     let (added, first) = start(&mesh, 1);
     assert!(added > 0);

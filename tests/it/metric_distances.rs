@@ -1,23 +1,26 @@
 //! Distances, certified intervals, volume error and axis distance against closed forms.
 
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, UnionError};
 use medial::geometry::{Cone, Slab, Sphere};
 use medial::metrics::{
-    Certificate, DistanceOptions, Distances, EnvelopeOptions, MetricError, ROUNDING, VolumeOptions,
-    Witness, WitnessSide, certify, distances, enclosed_volume, sample_envelope, volume_error,
+    Certificate, Distances, EnvelopeOptions, Judge, JudgeOptions, MetricError, ROUNDING, Truth,
+    Witness, WitnessSide, certify, enclosed_volume, sample_envelope,
 };
 use medial::surface::{TriMesh, TriangleBvh};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-const OPTIONS: DistanceOptions =
-    DistanceOptions { surface_samples: 20_000, envelope_samples: 20_000, seed: 0 };
+fn judge(surface: &TriMesh, samples: usize, seed: u64) -> Judge {
+    let options = JudgeOptions { samples, volume_depth: 6, seed };
+    crate::judge(surface, Truth::default(), options)
+}
 
 fn measure(surface: &TriMesh, mesh: &MedialMesh) -> Distances {
-    distances(surface, &TriangleBvh::new(surface).unwrap(), mesh, &OPTIONS).unwrap()
+    judge(surface, 20_000, 0).distances(mesh).unwrap()
 }
 
 fn complex(spheres: &[(Vec3, f64)], edges: &[[u32; 2]], faces: &[[u32; 3]]) -> MedialMesh {
@@ -98,13 +101,8 @@ fn a_box_is_rebuilt_from_its_exact_axis() {
     assert!(d.spheres_only <= exact && d.spheres_only > exact - 0.01, "{d:?}");
     assert_eq!(d.samples, 20_008);
 
-    let union = MedialUnion::new(&axis).unwrap();
-    let bvh = TriangleBvh::new(&surface).unwrap();
-    let size = Vec3::new(3.0, 2.0, 1.0);
-    let inside = |p: Vec3| p.cmpgt(Vec3::ZERO).all() && p.cmplt(size).all();
     assert_eq!(enclosed_volume(&surface), 6.0);
-    let error = volume_error(&surface, &bvh, inside, &union, &VolumeOptions::default()).unwrap();
-    assert_eq!(error, 0.0);
+    assert_eq!(judge(&surface, 100, 0).volume_error(&axis), Ok(Some(0.0)));
 
     // Without one corner of the axis the box lacks the edges that meet there.
     let chipped = axis.induced(&(0..12).map(|k| k != 4).collect::<Vec<_>>());
@@ -142,12 +140,8 @@ fn a_ball_in_a_ball_has_the_difference_of_the_radii_everywhere() {
     }
     assert!((d.mean - 0.2).abs() < sag && (d.reverse_mean - 0.2).abs() < sag);
 
-    let bvh = TriangleBvh::new(&surface).unwrap();
-    let union = MedialUnion::new(&axis).unwrap();
     let volume = enclosed_volume(&surface);
-    let inside = |p: Vec3| bvh.closest(p).point.length() > p.length();
-    let options = VolumeOptions { depth: 6, seed: 3 };
-    let error = volume_error(&surface, &bvh, inside, &union, &options).unwrap();
+    let error = judge(&surface, 100, 3).volume_error(&axis).unwrap().unwrap();
     let exact = 1.0 - 4.0 / 3.0 * PI * inner.powi(3) / volume;
     assert!((error - exact).abs() < 2e-3, "{error} for {exact}");
 }
@@ -233,41 +227,36 @@ fn unions_without_area_are_measured_at_their_centres() {
 fn results_do_not_depend_on_threads() {
     let (surface, axis) = cuboid(3.0, 2.0, 1.0);
     let blunt = axis.induced(&(0..12).map(|k| k % 3 != 0).collect::<Vec<_>>());
-    let bvh = TriangleBvh::new(&surface).unwrap();
-    let union = MedialUnion::new(&blunt).unwrap();
-    let inside = |p: Vec3| p.cmpgt(Vec3::ZERO).all() && p.cmplt(Vec3::new(3.0, 2.0, 1.0)).all();
     let run = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let options = VolumeOptions { depth: 5, seed: 1 };
-        pool.install(|| {
-            let volume = volume_error(&surface, &bvh, inside, &union, &options).unwrap();
+        crate::on_threads(threads, || {
+            let volume = judge(&surface, 100, 1).volume_error(&blunt).unwrap();
             (volume, measure(&surface, &blunt), certified(&surface, &blunt, 0.1))
         })
     };
     let one = run(1);
-    assert!(one.0 > 0.0);
+    assert!(one.0 > Some(0.0));
     assert_eq!(one, run(3));
 }
 
 #[test]
 fn unmeasurable_inputs_are_rejected() {
     let (surface, axis) = cuboid(3.0, 2.0, 1.0);
-    let bvh = TriangleBvh::new(&surface).unwrap();
-    let options = DistanceOptions { surface_samples: 10, envelope_samples: 10, seed: 0 };
-    let empty = MedialMesh::default();
-    assert!(matches!(distances(&surface, &bvh, &empty, &options), Err(MetricError::Union(_))));
+    let measured =
+        |surface: &TriMesh, mesh: &MedialMesh, samples| judge(surface, samples, 0).distances(mesh);
+    let empty = measured(&surface, &MedialMesh::default(), 10);
+    assert!(matches!(empty, Err(MetricError::Union(_))));
     let flat = TriMesh { vertices: vec![Vec3::ZERO; 3], faces: vec![[0, 1, 2]] };
-    assert_eq!(distances(&flat, &bvh, &axis, &options), Err(MetricError::NoArea));
+    assert_eq!(measured(&flat, &axis, 10), Err(MetricError::NoArea));
     let far = complex(&[(Vec3::ZERO, 1.0), (Vec3::X * 1e200, 1.0)], &[[0, 1]], &[]);
-    let refused = distances(&surface, &bvh, &far, &options);
+    let refused = measured(&surface, &far, 10);
     assert_eq!(refused, Err(MetricError::Union(UnionError::TooLarge { sphere: 1 })));
-    let none = DistanceOptions { surface_samples: 0, ..options };
-    assert!(matches!(distances(&surface, &bvh, &axis, &none), Err(MetricError::NoSamples(_))));
-    let none = DistanceOptions { envelope_samples: 0, ..options };
-    assert!(matches!(distances(&surface, &bvh, &axis, &none), Err(MetricError::NoSamples(_))));
+    assert!(matches!(measured(&surface, &axis, 0), Err(MetricError::NoSamples(_))));
     let union = MedialUnion::new(&axis).unwrap();
+    let none = EnvelopeOptions { samples: 0, burial: 0.0, seed: 0 };
+    let error = sample_envelope(&axis, &union, &none);
+    assert!(matches!(error, Err(MetricError::NoSamples(_))));
     let open = TriMesh { vertices: surface.vertices.clone(), faces: vec![[0, 1, 2]] };
-    let error = volume_error(&open, &bvh, |_| false, &union, &VolumeOptions::default());
+    let error = judge(&open, 10, 0).volume_error(&axis);
     assert!(matches!(error, Err(MetricError::NoVolume(_))));
 }
 
@@ -433,6 +422,42 @@ fn block_without(lo: Vec3, hi: Vec3) -> TriMesh {
     mesh
 }
 
+/// A surface and a medial mesh, divided by a length.
+fn divided(mut surface: TriMesh, mesh: &MedialMesh, by: f64) -> (TriMesh, MedialMesh) {
+    surface.vertices.iter_mut().for_each(|v| *v /= by);
+    (surface, mesh.transformed(1.0 / by, |p| p / by))
+}
+
+/// The measured distance is a share of the exact one, which is in the intervals of these widths.
+#[track_caller]
+fn agrees(
+    (surface, mesh): &(TriMesh, MedialMesh),
+    exact: f64,
+    shares: Range<f64>,
+    tolerances: &[f64],
+) -> Distances {
+    let measured = measure(surface, mesh);
+    let share = measured.hausdorff / exact;
+    assert!(shares.contains(&share), "{share} of {exact}");
+    let bvh = TriangleBvh::new(surface).unwrap();
+    for &tolerance in tolerances {
+        let found = certify(surface, &bvh, mesh, tolerance).unwrap();
+        assert!((found.lower..=found.upper).contains(&exact), "{exact} is not in {found:?}");
+        assert!(found.upper - found.lower <= tolerance);
+        assert!(measured.hausdorff <= found.upper);
+    }
+    measured
+}
+
+/// Two plates at these heights, as thick and as far from the sides of a rectangle as twice and once the radius.
+fn two_plates([x, y]: [f64; 2], r: f64, heights: [f64; 2]) -> MedialMesh {
+    let plate = |z: f64| {
+        [[r, r], [x - r, r], [x - r, y - r], [r, y - r]].map(|[x, y]| (Vec3::new(x, y, z), r))
+    };
+    let spheres = heights.map(plate).concat();
+    complex(&spheres, &[], &[[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+}
+
 /// The axis of a whole block fills slots, pockets, tubes and cavities of any width, whose walls are far from its boundary.
 #[test]
 fn filled_cavities_are_as_far_as_their_walls() {
@@ -446,20 +471,13 @@ fn filled_cavities_are_as_far_as_their_walls() {
             (Vec3::new(low, 0.9, 0.0), Vec3::new(high, 0.9 + width, 1.0)),
             (Vec3::new(low, 0.5, 0.2), Vec3::new(high, 1.5, 0.8)),
         ] {
-            let mut surface = block_without(lo, hi);
+            let surface = block_without(lo, hi);
             medial::surface::validate(&surface).expect("a solid");
             // Half way up every wall, as far from the top as from the bottom.
             let exact = 0.5 / 14_f64.sqrt();
-            surface.vertices.iter_mut().for_each(|v| *v /= 14_f64.sqrt());
-            let axis = axis.transformed(1.0 / 14_f64.sqrt(), |p| p / 14_f64.sqrt());
-            let measured = measure(&surface, &axis);
-            let share = measured.hausdorff / exact;
-            assert!((0.999..1.0 + 1e-9).contains(&share), "{share} of {exact}, {lo} to {hi}");
+            let filled = divided(surface, &axis, 14_f64.sqrt());
+            let measured = agrees(&filled, exact, 0.999..1.0 + 1e-9, &[1e-3]);
             assert_eq!(measured.hausdorff, measured.epsilon_union);
-            let bvh = TriangleBvh::new(&surface).unwrap();
-            let found = certify(&surface, &bvh, &axis, 1e-3).unwrap();
-            assert!((found.lower..=found.upper).contains(&exact), "{exact} is not in {found:?}");
-            assert!(found.upper - found.lower <= 1e-3);
         }
     }
 }
@@ -470,7 +488,7 @@ fn filled_cavities_are_as_far_as_their_walls() {
 fn tubes_in_many_balls_are_certified() {
     for seed in 0..3 {
         let mut rng = Pcg64::seed_from_u64(seed);
-        let mut surface = block_without(Vec3::new(1.5, 1.0, 0.0), Vec3::new(1.51, 1.01, 1.0));
+        let surface = block_without(Vec3::new(1.5, 1.0, 0.0), Vec3::new(1.51, 1.01, 1.0));
         let size = Vec3::new(3.0, 2.0, 1.0);
         let balls: Vec<_> = (0..300)
             .map(|_| {
@@ -479,9 +497,7 @@ fn tubes_in_many_balls_are_certified() {
                 (centre, room.fold(1.0, f64::min) * rng.random_range(0.8..1.03))
             })
             .collect();
-        let scale = 1.0 / 14_f64.sqrt();
-        surface.vertices.iter_mut().for_each(|v| *v *= scale);
-        let mesh = complex(&balls, &[], &[]).transformed(scale, |p| p * scale);
+        let (surface, mesh) = divided(surface, &complex(&balls, &[], &[]), 14_f64.sqrt());
         let measured = measure(&surface, &mesh).hausdorff;
         let bvh = TriangleBvh::new(&surface).unwrap();
         let found = certify(&surface, &bvh, &mesh, 2e-3).unwrap();
@@ -493,30 +509,16 @@ fn tubes_in_many_balls_are_certified() {
 /// Two plates that overlap fill a cavity: ways out of the deeper one lead into the other, again and again.
 #[test]
 fn cavities_in_two_plates_are_certified() {
-    let scale = 1.0 / 14_f64.sqrt();
     let cases = [0.2, 0.02, 1e-4, 1e-9, 0.0].map(|overlap| [(overlap, 0.05), (overlap, 0.001)]);
     for (overlap, height) in cases.into_iter().flatten() {
         let lo = Vec3::new(1.45, 0.95, 0.5 - height);
-        let mut surface = block_without(lo, Vec3::new(1.55, 1.05, 0.5 + height));
-        surface.vertices.iter_mut().for_each(|v| *v *= scale);
-        let bvh = TriangleBvh::new(&surface).unwrap();
-        let plate = |z: f64| {
-            [[0.3, 0.3], [2.7, 0.3], [2.7, 1.7], [0.3, 1.7]].map(|[x, y]| (Vec3::new(x, y, z), 0.3))
-        };
+        let surface = block_without(lo, Vec3::new(1.55, 1.05, 0.5 + height));
         let offset = 0.3 - overlap / 2.0;
-        let spheres = [plate(0.5 - offset), plate(0.5 + offset)].concat();
-        let mesh = complex(&spheres, &[], &[[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]);
-        let mesh = mesh.transformed(scale, |p| p * scale);
+        let plates = two_plates([3.0, 2.0], 0.3, [0.5 - offset, 0.5 + offset]);
         // From half way up the walls to the outer side of either plate.
-        let exact = (0.6 - overlap / 2.0) * scale;
-        let measured = measure(&surface, &mesh).hausdorff;
-        let share = measured / exact;
-        assert!((0.999..1.0 + 1e-6).contains(&share), "{share} of {exact}, overlap {overlap}");
-        for tolerance in [1e-2, 1e-3] {
-            let found = certify(&surface, &bvh, &mesh, tolerance).unwrap();
-            assert!((found.lower..=found.upper).contains(&exact), "{exact}: {found:?}, {overlap}");
-            assert!(found.upper - found.lower <= tolerance);
-        }
+        let exact = (0.6 - overlap / 2.0) / 14_f64.sqrt();
+        let filled = divided(surface, &plates, 14_f64.sqrt());
+        agrees(&filled, exact, 0.999..1.0 + 1e-6, &[1e-2, 1e-3]);
     }
 }
 
@@ -524,35 +526,19 @@ fn cavities_in_two_plates_are_certified() {
 /// unless a gap is wider than 1e-7 of the diameter, whatever the diagonal of the bounding box of the turned block.
 #[test]
 fn walls_between_primitives_that_touch_are_no_boundary() {
-    for overlap in [-1e-5, -1e-6, -7.5e-7, -3e-7, -1e-8, 0.0, 1e-12, 1e-9, 1e-7, 1e-4] {
-        walls_of_plates_that_overlap_by(overlap, 6.0);
+    let overlaps = [-1e-5, -1e-6, -7.5e-7, -3e-7, -1e-8, 0.0, 1e-12, 1e-9, 1e-7, 1e-4];
+    for (overlap, size) in
+        overlaps.map(|overlap| (overlap, 6.0)).into_iter().chain([(-7.5e-7, 9.0)])
+    {
+        let (surface, _) = cuboid(4.0, 4.0, 2.0);
+        let plates = two_plates([4.0, 4.0], 0.5, [0.5, 1.5 - overlap]);
+        // From the bottom of the notch around the plates, where their rims meet at an edge of the box, to its sides;
+        // from the middle of a gap to the ends of the box.
+        let half = (1.0 - overlap) / 2.0;
+        let notch = (0.5 - f64::sqrt((0.25 - half * half).max(0.0) / 2.0)) / size;
+        let exact = if overlap < -6e-7 { 1.0 / size } else { notch };
+        agrees(&divided(surface, &plates, size), exact, 0.97..1.0 + 1e-6, &[5e-3]);
     }
-    walls_of_plates_that_overlap_by(-7.5e-7, 9.0);
-}
-
-/// In a block with a diagonal of 6, divided by `size`.
-fn walls_of_plates_that_overlap_by(overlap: f64, size: f64) {
-    let (mut surface, _) = cuboid(4.0, 4.0, 2.0);
-    surface.vertices.iter_mut().for_each(|v| *v /= size);
-    let bvh = TriangleBvh::new(&surface).unwrap();
-    let plate = |z: f64| {
-        [[0.5, 0.5], [3.5, 0.5], [3.5, 3.5], [0.5, 3.5]].map(|[x, y]| (Vec3::new(x, y, z), 0.5))
-    };
-    let spheres = [plate(0.5), plate(1.5 - overlap)].concat();
-    let mesh = complex(&spheres, &[], &[[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]);
-    let mesh = mesh.transformed(1.0 / size, |p| p / size);
-    // From the bottom of the notch around the plates, where their rims meet at an edge of the box, to its sides; from
-    // the middle of a gap to the ends of the box.
-    let half = (1.0 - overlap) / 2.0;
-    let notch = (0.5 - f64::sqrt((0.25 - half * half).max(0.0) / 2.0)) / size;
-    let exact = if overlap < -6e-7 { 1.0 / size } else { notch };
-    let measured = measure(&surface, &mesh).hausdorff;
-    let share = measured / exact;
-    assert!((0.97..1.0 + 1e-6).contains(&share), "{share} of {exact}, overlap {overlap}");
-    let found = certify(&surface, &bvh, &mesh, 5e-3);
-    let found = found.unwrap_or_else(|error| panic!("overlap {overlap}: {error}"));
-    assert!((found.lower..=found.upper).contains(&exact), "{exact}: {found:?}, {overlap}");
-    assert!(measured <= found.upper && found.upper - found.lower <= 5e-3);
 }
 
 #[test]
@@ -561,15 +547,14 @@ fn the_interval_agrees_with_samples_on_random_meshes() {
     let mut random =
         |scale: f64| scale * Vec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
     let surface = centred_cuboid(Vec3::new(0.35, 0.3, 0.2));
-    let bvh = TriangleBvh::new(&surface).unwrap();
+    let judge = judge(&surface, 5_000, 1);
     for round in 0..12 {
         let spheres: Vec<_> =
             (0..8).map(|_| (random(0.3), random(0.2).length() * f64::from(round % 3))).collect();
         let edges = [[0, 5], [5, 6], [1, 7]];
         let mesh = complex(&spheres, &edges, &[[0, 1, 2], [1, 2, 3], [2, 3, 4]]);
         let interval = certified(&surface, &mesh, 1e-3);
-        let options = DistanceOptions { surface_samples: 5_000, envelope_samples: 5_000, seed: 1 };
-        let sampled = distances(&surface, &bvh, &mesh, &options).unwrap().hausdorff;
+        let sampled = judge.distances(&mesh).unwrap().hausdorff;
         assert!(sampled <= interval.upper, "{sampled} is above {interval:?}");
         // The largest samples alone fall short by a tenth.
         assert!(sampled >= 0.99 * interval.lower, "{sampled} is far below {interval:?}");
@@ -580,7 +565,6 @@ fn the_interval_agrees_with_samples_on_random_meshes() {
 #[test]
 fn the_highest_of_many_narrow_bumps_is_found() {
     let surface = crate::shapes::sphere(4);
-    let bvh = TriangleBvh::new(&surface).unwrap();
     let bump = |direction: Vec3, height: f64| ((0.98 + height) * direction, 0.02);
     for seed in 0..4 {
         let mut rng = Pcg64::seed_from_u64(seed);
@@ -592,8 +576,7 @@ fn the_highest_of_many_narrow_bumps_is_found() {
         let normal = (b - a).cross(c - a).normalize();
         balls.push(bump(normal, 0.015));
         let exact = 1.015 - normal.dot(a);
-        let options = DistanceOptions { surface_samples: 500, envelope_samples: 500, seed };
-        let sampled = distances(&surface, &bvh, &complex(&balls, &[], &[]), &options).unwrap();
+        let sampled = judge(&surface, 500, seed).distances(&complex(&balls, &[], &[])).unwrap();
         let share = sampled.hausdorff / exact;
         assert!((0.99..1.0 + 1e-9).contains(&share), "{share} of {exact}");
     }

@@ -7,16 +7,18 @@
 use Symmetry::{Broken, Shared};
 use medial::Vec3;
 use medial::complex::{MedialMesh, Sphere};
-use medial::metrics::{
-    Certificate, DistanceOptions, Evaluation, Judge, JudgeOptions, Truth, certify, distances,
-};
-use medial::surface::{InsideTest, TriMesh, TriangleBvh};
+use medial::metrics::{Certificate, Evaluation, JudgeOptions, Truth, certify};
+use medial::surface::{TriMesh, TriangleBvh};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde_json::{Value, json};
 
-use crate::shapes;
+use crate::{judge, shapes};
+
+fn options(samples: usize, volume_depth: u32) -> JudgeOptions {
+    JudgeOptions { samples, volume_depth, seed: 4 }
+}
 
 /// A solid without symmetries: a box with bumps, of diagonal 1 or so, 768 triangles.
 fn solid() -> TriMesh {
@@ -89,7 +91,7 @@ fn interval(surface: &TriMesh, mesh: &MedialMesh, tolerance: f64) -> Certificate
 /// Every number of an evaluation without intervals, with the sheets against a reference and the known axis `truth`.
 fn everything(surface: &TriMesh, mesh: &MedialMesh, [truth, reference]: [&MedialMesh; 2]) -> Value {
     let truth = Truth { betti: Some([1, 0, 0]), axis: Some(truth.clone()), diagonal: 1.0 };
-    let judge = judge(surface, truth, 3_000, 4);
+    let judge = judge(surface, truth, options(3_000, 4));
     let sheets = judge.sheet_difference(mesh, reference).unwrap();
     json!({ "evaluation": judge.evaluate(mesh).unwrap(), "sheets": sheets })
 }
@@ -99,8 +101,7 @@ fn every_number_of_an_evaluation_moves_with_the_shape() {
     let (surface, mesh, others) = (solid(), axis(1), [axis(2), axis(3)]);
     let before = everything(&surface, &mesh, others.each_ref());
     let measured = |surface: &TriMesh, mesh: &MedialMesh| {
-        let options = DistanceOptions { surface_samples: 5_000, envelope_samples: 5_000, seed: 3 };
-        let found = distances(surface, &TriangleBvh::new(surface).unwrap(), mesh, &options);
+        let found = judge(surface, Truth::default(), options(5_000, 0)).distances(mesh);
         serde_json::to_value(found.unwrap()).unwrap()
     };
     let plain = measured(&surface, &mesh);
@@ -173,15 +174,8 @@ fn symmetric() -> Vec<(&'static str, Symmetry, TriMesh, MedialMesh)> {
     ]
 }
 
-fn judge(surface: &TriMesh, truth: Truth, samples: usize, volume_depth: u32) -> Judge {
-    let tree = TriangleBvh::new(surface).unwrap().into();
-    let inside = InsideTest::new(surface).into();
-    let options = JudgeOptions { samples, volume_depth, seed: 4 };
-    Judge::new(surface.clone(), tree, inside, truth, options)
-}
-
 fn judged(surface: &TriMesh, mesh: &MedialMesh) -> Evaluation {
-    judge(surface, Truth::default(), 3_000, 5).evaluate(mesh).unwrap()
+    judge(surface, Truth::default(), options(3_000, 5)).evaluate(mesh).unwrap()
 }
 
 #[test]
@@ -255,7 +249,7 @@ fn renumbering_changes_nothing_at_all() {
     let (surface, mesh, truth, reference) = (solid(), axis(1), axis(2), axis(3));
     let list = mesh.spheres_alone();
     let measured = |mesh: &MedialMesh, list: &MedialMesh, reference: &MedialMesh| {
-        let judge = judge(&surface, Truth::default(), 3_000, 4);
+        let judge = judge(&surface, Truth::default(), options(3_000, 4));
         let intervals = [mesh, list].map(|m| judge.evaluate_certified(m, Some(1e-3)).unwrap());
         json!({ "all": everything(&surface, mesh, [&truth, reference]), "intervals": intervals })
     };
@@ -327,7 +321,7 @@ fn cuboid() -> (TriMesh, MedialMesh) {
 }
 
 fn warnings(mesh: &MedialMesh) -> Vec<String> {
-    judge(&cuboid().0, Truth::default(), 2_000, 3).evaluate(mesh).unwrap().warnings
+    judge(&cuboid().0, Truth::default(), options(2_000, 3)).evaluate(mesh).unwrap().warnings
 }
 
 fn with_radii(of: impl Fn(f64) -> f64) -> MedialMesh {

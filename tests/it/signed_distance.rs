@@ -53,10 +53,7 @@ fn signed_distances_are_distances_with_the_side_for_any_threads() {
     let (tree, test) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
     let distance = SignedDistance::closed(&tree, &test);
     let points = points(2000, 6);
-    let batch = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| distance.batch(&points))
-    };
+    let batch = |threads: usize| crate::on_threads(threads, || distance.batch(&points));
     let found = batch(1);
     assert_eq!(found, batch(2));
     assert_eq!(found, batch(3));

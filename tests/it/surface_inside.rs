@@ -120,8 +120,7 @@ fn batches_equal_single_queries_for_any_number_of_threads() {
     let points: Vec<Vec3> = lattice(-7, 7).map(|p| p * 0.45).chain(mesh.vertices.clone()).collect();
     let single: Vec<Side> = points.iter().map(|&p| test.side(p)).collect();
     for threads in [1, 3] {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        assert_eq!(pool.install(|| test.sides(&points)), single);
+        assert_eq!(crate::on_threads(threads, || test.sides(&points)), single);
     }
     assert!(test.sides(&[]).is_empty());
 }
@@ -301,8 +300,7 @@ fn seeds_threads_and_scale() {
     for sampling in [UNIFORM, BLUE] {
         let points = sample(&mesh, &sampling);
         for threads in [1, 3] {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            assert_eq!(pool.install(|| sample(&mesh, &sampling)), points);
+            assert_eq!(crate::on_threads(threads, || sample(&mesh, &sampling)), points);
         }
         // Powers of two scale exactly; 1e200 must not overflow when squared.
         for power in [2_f64.powi(660), 2_f64.powi(-530)] {

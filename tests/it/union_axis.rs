@@ -279,10 +279,7 @@ fn threads_and_powers_of_two_do_not_matter() {
     let mut rng = Pcg64::seed_from_u64(46);
     let balls: Vec<_> =
         (0..5_000).map(|_| Sphere::new(unit(&mut rng), rng.random_range(0.0..0.15))).collect();
-    let with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| checked(&balls).1)
-    };
+    let with = |threads: usize| crate::on_threads(threads, || checked(&balls).1);
     let alone = with(1);
     assert!(alone == with(2) && alone == with(5));
     let scaled: Vec<_> =

@@ -214,8 +214,7 @@ proptest! {
         let axis = mesh(&spheres, &edges, &faces);
         let made = union_surface(&axis, tolerance).unwrap();
         prop_assert!(surface::validate(&made.mesh).is_ok());
-        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-        prop_assert_eq!(one.install(|| union_surface(&axis, tolerance).unwrap()), made);
+        prop_assert_eq!(crate::on_threads(1, || union_surface(&axis, tolerance).unwrap()), made);
         // The sandwich, at the corners of a lattice.
         let union = MedialUnion::new(&axis).unwrap();
         let inside = medial::surface::InsideTest::new(
