@@ -71,7 +71,7 @@ impl PreparedAxis {
 
     fn max_and_mean(&self, to: &TriangleBvh, samples: usize, seed: u64) -> [f64; 2] {
         let placed = place_on_triangles(&self.triangles, samples, seed).unwrap_or_default();
-        let sheets: Vec<Vec3> = placed.iter().map(|placed| placed.on(&self.triangles)).collect();
+        let sheets: Vec<Vec3> = placed.into_iter().map(|(_, point)| point).collect();
         let curves = sample_segments(&self.segments, samples);
         let sets = [&sheets, &curves, &self.centres].map(|points| to.distance_batch(points));
         let max = sets.iter().flatten().copied().fold(0.0, f64::max);

@@ -143,13 +143,13 @@ impl SurfaceSide<'_> {
     /// the centre or at a corner.
     fn above(&self, triangle: &[Vec3; 3], enough: f64, deepest: NearestPrimitive) -> f64 {
         let Boundary { union, patches, .. } = self.boundary;
-        let mut least = patches.hulls.largest_over(deepest.primitive, triangle);
+        let mut least = patches.largest_over(deepest.primitive, triangle);
         for &corner in triangle {
             if least <= enough {
                 break;
             }
             let deepest = union.deepest(corner).primitive;
-            least = least.min(patches.hulls.largest_over(deepest, triangle));
+            least = least.min(patches.largest_over(deepest, triangle));
         }
         least
     }

@@ -472,36 +472,46 @@ mod tests {
 
     use super::*;
     use crate::complex::MedialMesh;
-    use crate::surface::TriMesh;
+    use crate::surface::fixtures::cuboid;
 
     const TOLERANCE: f64 = 1e-3;
 
-    /// The sides of a box with these half sizes, outward, or inward for a cavity.
-    fn sides(half: Vec3, shift: Vec3, is_cavity: bool, mesh: &mut TriMesh) {
-        let first = mesh.vertices.len() as u32;
-        mesh.vertices.extend((0..8_u32).map(|k| {
-            let sign = |bit: u32| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
-            shift + half * Vec3::new(sign(0), sign(1), sign(2))
-        }));
-        let quads =
-            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
-        mesh.faces.extend(faces.map(|face: [u32; 3]| {
-            let [a, b, c] = face.map(|v| first + v);
-            if is_cavity { [a, c, b] } else { [a, b, c] }
-        }));
+    struct Solid {
+        mesh: TriMesh,
+        tree: TriangleBvh,
+        inside: InsideTest,
     }
 
-    fn cube(half: f64) -> TriMesh {
-        let mut mesh = TriMesh::default();
-        sides(Vec3::splat(half), Vec3::ZERO, false, &mut mesh);
+    impl Solid {
+        fn of(mesh: TriMesh) -> Self {
+            let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
+            Self { mesh, tree, inside }
+        }
+
+        fn test(&self) -> CoverTest<'_> {
+            CoverTest::new(&self.mesh, &self.tree, &self.inside)
+        }
+    }
+
+    /// A box around the origin.
+    fn block(half: Vec3) -> TriMesh {
+        cuboid(-half, half)
+    }
+
+    fn joined(mut mesh: TriMesh, other: TriMesh) -> TriMesh {
+        let first = mesh.vertices.len() as u32;
+        mesh.vertices.extend(other.vertices);
+        mesh.faces.extend(other.faces.into_iter().map(|face| face.map(|v| first + v)));
         mesh
     }
 
+    fn cube(half: f64) -> Solid {
+        Solid::of(block(Vec3::splat(half)))
+    }
+
     /// Both errors, of which each interval is no wider than the tolerance.
-    fn errors(mesh: &TriMesh, balls: &[Sphere], tolerance: f64) -> [OneSided; 2] {
-        let (tree, inside) = (TriangleBvh::new(mesh).unwrap(), InsideTest::new(mesh));
-        let test = CoverTest::new(mesh, &tree, &inside);
+    fn errors(solid: &Solid, balls: &[Sphere], tolerance: f64) -> [OneSided; 2] {
+        let test = solid.test();
         let both = [test.uncovered(balls, tolerance), test.overshoot(balls, tolerance)];
         both.map(|interval| {
             let interval = interval.unwrap();
@@ -533,10 +543,10 @@ mod tests {
 
     #[test]
     fn a_hole_inside_the_solid_is_uncovered() {
-        let mesh = cube(0.25);
+        let solid = cube(0.25);
         // They cover all sides, whose centres are at the distance 0.25 * sqrt 2, not the centre.
-        let balls: Vec<_> = mesh.vertices.iter().map(|&v| Sphere::new(v, 0.375)).collect();
-        let [uncovered, overshoot] = errors(&mesh, &balls, TOLERANCE);
+        let balls: Vec<_> = solid.mesh.vertices.iter().map(|&v| Sphere::new(v, 0.375)).collect();
+        let [uncovered, overshoot] = errors(&solid, &balls, TOLERANCE);
         holds(uncovered, 0.25 * 3_f64.sqrt() - 0.375);
         holds(overshoot, 0.375);
         let witness = uncovered.witness.unwrap();
@@ -545,15 +555,16 @@ mod tests {
 
     #[test]
     fn a_ball_in_a_cavity_is_farthest_from_the_solid_at_its_centre() {
-        let mut mesh = cube(0.25);
-        sides(Vec3::splat(0.125), Vec3::ZERO, true, &mut mesh);
+        let mut cavity = block(Vec3::splat(0.125));
+        cavity.faces.iter_mut().for_each(|face| face.swap(1, 2));
+        let solid = Solid::of(joined(block(Vec3::splat(0.25)), cavity));
         for radius in [0.05, 0.2] {
             let balls = [Sphere::new(Vec3::ZERO, radius)];
-            holds(errors(&mesh, &balls, TOLERANCE)[1], 0.125);
+            holds(errors(&solid, &balls, TOLERANCE)[1], 0.125);
         }
         // Outside the solid alone: the union covers nothing.
         let balls = [Sphere::new(Vec3::new(0.75, 0.0, 0.0), 0.25)];
-        let [uncovered, overshoot] = errors(&mesh, &balls, TOLERANCE);
+        let [uncovered, overshoot] = errors(&solid, &balls, TOLERANCE);
         holds(overshoot, 0.75);
         holds(uncovered, Vec3::new(1.0, 0.25, 0.25).length() - 0.25);
     }
@@ -593,11 +604,8 @@ mod tests {
 
     #[test]
     fn samples_never_contradict_the_intervals() {
-        let mut mesh = TriMesh::default();
-        sides(Vec3::new(0.4, 0.1, 0.05), Vec3::ZERO, false, &mut mesh);
-        sides(Vec3::new(0.1, 0.2, 0.05), Vec3::new(0.2, 0.4, 0.0), false, &mut mesh);
-        let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
-        let test = CoverTest::new(&mesh, &tree, &inside);
+        let other = cuboid(Vec3::new(0.1, 0.2, -0.05), Vec3::new(0.3, 0.6, 0.05));
+        let solid = Solid::of(joined(block(Vec3::new(0.4, 0.1, 0.05)), other));
         let mut random = Pcg64::seed_from_u64(5);
         let mut point =
             |scale: f64| scale * Vec3::from([0; 3].map(|_| random.random_range(-1.0..1.0)));
@@ -606,17 +614,15 @@ mod tests {
             let balls: Vec<_> = (0..10 + 8 * round).map(ball).collect();
             let sigma =
                 |p: Vec3| balls.iter().map(|b| b.signed_distance(p)).fold(f64::INFINITY, f64::min);
-            let intervals = errors(&mesh, &balls, TOLERANCE);
-            hold_for_samples(&test, intervals, 0.06, sigma, || point(0.7));
+            let intervals = errors(&solid, &balls, TOLERANCE);
+            hold_for_samples(&solid.test(), intervals, 0.06, sigma, || point(0.7));
         }
     }
 
     #[test]
     fn cones_and_slabs_cover_as_their_union_does() {
-        let mut mesh = TriMesh::default();
-        sides(Vec3::new(0.4, 0.2, 0.05), Vec3::ZERO, false, &mut mesh);
-        let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
-        let test = CoverTest::new(&mesh, &tree, &inside);
+        let solid = Solid::of(block(Vec3::new(0.4, 0.2, 0.05)));
+        let test = solid.test();
         let mut random = Pcg64::seed_from_u64(7);
         let mut point =
             |scale: Vec3| scale * Vec3::from([0; 3].map(|_| random.random_range(-1.0..1.0)));
@@ -638,9 +644,8 @@ mod tests {
 
     #[test]
     fn a_capsule_is_covered_by_its_cone() {
-        let mesh = cube(0.05);
-        let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
-        let test = CoverTest::new(&mesh, &tree, &inside);
+        let solid = cube(0.05);
+        let test = solid.test();
         let ends = [-0.05, 0.05].map(|x| Sphere::new(Vec3::new(x, 0.0, 0.0), 0.08));
         let rod = MedialMesh::from_simplices(ends.to_vec(), vec![[0, 1]], vec![]).unwrap();
         let [uncovered, overshoot] =
@@ -652,9 +657,8 @@ mod tests {
 
     #[test]
     fn unmeasurable_balls_are_errors() {
-        let mesh = cube(0.25);
-        let (tree, inside) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
-        let test = CoverTest::new(&mesh, &tree, &inside);
+        let solid = cube(0.25);
+        let test = solid.test();
         assert!(matches!(test.uncovered(&[], 1e-3), Err(MetricError::Union(_))));
         let balls = [Sphere::new(Vec3::ZERO, 0.1)];
         assert_eq!(test.overshoot(&balls, 0.0), Err(MetricError::Tolerance(0.0)));

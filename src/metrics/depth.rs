@@ -227,7 +227,7 @@ impl<'a> Boundary<'a> {
             Piece::Round(v, _) => Sphere(v),
             Piece::Lateral(e, ..) => Edge(e),
         };
-        ahead.max(self.patches.hulls.signed(primitive, p).abs())
+        ahead.max(self.patches.signed(primitive, p).abs())
     }
 
     fn initial(&self) -> &[(Piece, Vec3, f64)] {

@@ -11,52 +11,6 @@ use crate::geometry::planar_frame::PlanarFrame;
 use crate::geometry::{Cone, ConeFrame, Slab, Sphere};
 use crate::surface::TriMesh;
 
-/// The primitives as whole convex bodies, unlike the parts of a [`MedialUnion`].
-pub(super) struct Hulls {
-    spheres: Vec<Sphere>,
-    cones: Vec<Cone>,
-    slabs: Vec<Slab>,
-}
-
-impl Hulls {
-    pub fn new(mesh: &MedialMesh) -> Self {
-        Self {
-            spheres: mesh.spheres.clone(),
-            cones: mesh
-                .edges
-                .iter()
-                .map(|&edge| {
-                    let [a, b] = mesh.spheres_of(edge);
-                    Cone::new(a, b)
-                })
-                .collect(),
-            slabs: mesh.faces.iter().map(|&f| Slab::new(mesh.spheres_of(f))).collect(),
-        }
-    }
-
-    /// The signed distance of a point to a primitive.
-    pub fn signed(&self, primitive: Primitive, p: Vec3) -> f64 {
-        match primitive {
-            Primitive::Sphere(v) => self.spheres[v as usize].signed_distance(p),
-            Primitive::Edge(e) => self.cones[e as usize].signed_distance(p),
-            Primitive::Face(f) => self.slabs[f as usize].signed_distance(p),
-        }
-    }
-
-    /// The largest signed distance to a primitive over the convex hull of some points.
-    pub fn largest_over(&self, primitive: Primitive, corners: &[Vec3]) -> f64 {
-        // A convex function is largest over a convex hull at one of its corners.
-        corners.iter().fold(f64::NEG_INFINITY, |largest, &p| largest.max(self.signed(primitive, p)))
-    }
-
-    /// Whether a primitive contains a convex polytope, by the signed distance at a point that is within `reach` of it.
-    pub fn bury(&self, at: NearestPrimitive, reach: f64, corners: &[Vec3]) -> bool {
-        // The Lipschitz bound first: it costs nothing.
-        at.signed < -EXPOSED
-            && (at.signed + reach < -EXPOSED || self.largest_over(at.primitive, corners) < -EXPOSED)
-    }
-}
-
 /// The distance from a point to the farthest of some others.
 pub(super) fn farthest(from: Vec3, points: &[Vec3]) -> f64 {
     points.iter().fold(0.0, |far, &p| f64::max(far, from.distance_squared(p))).sqrt()
@@ -117,10 +71,11 @@ pub(super) const SECTORS: u32 = 6;
 
 /// The surfaces of all primitives of a medial mesh.
 pub(super) struct Patches<'a> {
-    pub mesh: &'a MedialMesh,
-    pub hulls: Hulls,
+    mesh: &'a MedialMesh,
+    cones: Vec<Cone>,
+    slabs: Vec<Slab>,
     /// One for each edge; `None` where one sphere holds the other.
-    pub frames: Vec<Option<ConeFrame>>,
+    frames: Vec<Option<ConeFrame>>,
     /// The axes of the octants that spheres are divided into.
     axes: [Vec3; 3],
     /// Of the surface.
@@ -164,15 +119,42 @@ pub(super) struct Enclosure {
 impl<'a> Patches<'a> {
     /// Divisions follow the axes, so that they turn with the shape where the axes do.
     pub fn new(mesh: &'a MedialMesh, axes: [Vec3; 3], diameter: f64) -> Self {
-        let hulls = Hulls::new(mesh);
+        let cones = mesh.edges.iter().map(|&edge| {
+            let [a, b] = mesh.spheres_of(edge);
+            Cone::new(a, b)
+        });
+        let cones: Vec<Cone> = cones.collect();
+        let slabs = mesh.faces.iter().map(|&f| Slab::new(mesh.spheres_of(f))).collect();
         let frame = |cone: &Cone| {
             cone.frame().map(|frame| {
                 let v = across(&frame, axes);
                 ConeFrame { v, w: frame.u.cross(v), ..frame }
             })
         };
-        let frames = hulls.cones.iter().map(frame).collect();
-        Self { mesh, hulls, frames, axes, diameter, neighbours: neighbours(mesh) }
+        let frames = cones.iter().map(frame).collect();
+        Self { mesh, cones, slabs, frames, axes, diameter, neighbours: neighbours(mesh) }
+    }
+
+    /// The signed distance of a point to a primitive as a whole convex body, unlike the parts of a [`MedialUnion`].
+    pub fn signed(&self, primitive: Primitive, p: Vec3) -> f64 {
+        match primitive {
+            Primitive::Sphere(v) => self.sphere(v).signed_distance(p),
+            Primitive::Edge(e) => self.cones[e as usize].signed_distance(p),
+            Primitive::Face(f) => self.slabs[f as usize].signed_distance(p),
+        }
+    }
+
+    /// The largest signed distance to a primitive over the convex hull of some points.
+    pub fn largest_over(&self, primitive: Primitive, corners: &[Vec3]) -> f64 {
+        // A convex function is largest over a convex hull at one of its corners.
+        corners.iter().fold(f64::NEG_INFINITY, |largest, &p| largest.max(self.signed(primitive, p)))
+    }
+
+    /// Whether a primitive contains a convex polytope, by the signed distance at a point that is within `reach` of it.
+    pub fn bury(&self, at: NearestPrimitive, reach: f64, corners: &[Vec3]) -> bool {
+        // The Lipschitz bound first: it costs nothing.
+        at.signed < -EXPOSED
+            && (at.signed + reach < -EXPOSED || self.largest_over(at.primitive, corners) < -EXPOSED)
     }
 
     /// Width of gaps that count as none.
@@ -318,7 +300,7 @@ impl<'a> Patches<'a> {
         let mut deepest_at = |outward: Vec3| {
             let corners = enclosure.corners.map(|corner| corner + outward);
             let deepest = union.deepest_or(enclosure.centre + outward, near, burying(reach));
-            let is_buried = self.hulls.bury(deepest, reach, &corners[..enclosure.count]);
+            let is_buried = self.bury(deepest, reach, &corners[..enclosure.count]);
             (!is_buried).then_some(deepest)
         };
         let moved = deepest_at(self.gap() * self.normal(piece))?;

@@ -6,7 +6,6 @@
 
 use std::cell::LazyCell;
 use std::cmp::Ordering;
-use std::ops::{Add, Mul, Sub};
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -38,7 +37,8 @@ impl SurfaceSamples {
         }
         let pose = Pose::new(surface);
         let triangles = pose.triangles(surface);
-        let mut points = sample_triangles(&triangles, count, seed).ok_or(MetricError::NoArea)?;
+        let placed = place_on_triangles(&triangles, count, seed).ok_or(MetricError::NoArea)?;
+        let mut points: Vec<Vec3> = placed.into_iter().map(|(_, point)| point).collect();
         let mut used = vec![false; surface.vertices.len()];
         for &v in surface.faces.iter().flatten() {
             used[v as usize] = true;
@@ -75,41 +75,16 @@ fn area_of([a, b, c]: &[Vec3; 3]) -> f64 {
 /// medial mesh has no error at the samples that it was made from, so it must not be measured there.
 const STREAM: u64 = 0x6d65_6173_7572_6521;
 
-/// `count` points, uniform by area and stratified along the list of triangles; `None` when there
-/// is no area or it is not finite.
+/// `count` points, uniform by area and stratified along the list of triangles, each with the index of its
+/// triangle; `None` when there is no area or it is not finite.
 ///
 /// Stratified, unlike the independent points of [`crate::surface::Sampling::AreaUniform`]: means
 /// have less variance, and small parts are not missed by chance.
-fn sample_triangles(triangles: &[[Vec3; 3]], count: usize, seed: u64) -> Option<Vec<Vec3>> {
-    let placed = place_on_triangles(triangles, count, seed)?;
-    Some(placed.iter().map(|placed| placed.on(triangles)).collect())
-}
-
-/// A point of a triangle.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Placed {
-    pub triangle: usize,
-    /// Weights of the second and third corner.
-    weights: [f64; 2],
-}
-
-impl Placed {
-    /// The point, for triangles in a space of any dimension.
-    pub fn on<V>(&self, triangles: &[[V; 3]]) -> V
-    where
-        V: Copy + Add<Output = V> + Sub<Output = V> + Mul<f64, Output = V>,
-    {
-        let [a, b, c] = triangles[self.triangle];
-        a + (b - a) * self.weights[0] + (c - a) * self.weights[1]
-    }
-}
-
-/// As [`sample_triangles`], as places on the triangles.
 pub(super) fn place_on_triangles(
     triangles: &[[Vec3; 3]],
     count: usize,
     seed: u64,
-) -> Option<Vec<Placed>> {
+) -> Option<Vec<(usize, Vec3)>> {
     let total: f64 = triangles.iter().map(area_of).sum();
     if !(total > 0.0 && total.is_finite()) {
         return None;
@@ -122,7 +97,7 @@ pub(super) fn place_on_triangles(
         let size = area_of(triangle);
         below += size;
         while placed.len() < count && target < below {
-            placed.push(uniform_in(index, &mut rng));
+            placed.push((index, uniform_in(triangle, &mut rng)));
             target = (placed.len() as f64 + rng.random::<f64>()) / count as f64 * total;
         }
         if size > 0.0 {
@@ -131,16 +106,16 @@ pub(super) fn place_on_triangles(
     }
     // The running sum may end a rounding below the total.
     while let (true, Some(index)) = (placed.len() < count, last) {
-        placed.push(uniform_in(index, &mut rng));
+        placed.push((index, uniform_in(&triangles[index], &mut rng)));
     }
     Some(placed)
 }
 
-fn uniform_in(triangle: usize, rng: &mut Pcg64) -> Placed {
+fn uniform_in(&[a, b, c]: &[Vec3; 3], rng: &mut Pcg64) -> Vec3 {
     // The root makes the density uniform: it compensates for rows that widen away from a corner.
     let root = rng.random::<f64>().sqrt();
     let v = rng.random::<f64>();
-    Placed { triangle, weights: [root * (1.0 - v), root * v] }
+    a + (b - a) * (root * (1.0 - v)) + (c - a) * (root * v)
 }
 
 // A frame that moves along with a surface.

@@ -205,7 +205,7 @@ impl StructureSurface {
         let triangles: Vec<[Vec3; 3]> =
             on_sheets.map(|(&face, _)| mesh.spheres_of(face).map(|s| s.centre)).collect();
         let placed = place_on_triangles(&triangles, SHEET_SAMPLES, 0).unwrap_or_default();
-        let sheet: Vec<Vec3> = placed.iter().map(|placed| placed.on(&triangles)).collect();
+        let sheet: Vec<Vec3> = placed.into_iter().map(|(_, point)| point).collect();
         let along = |edges: &mut dyn Iterator<Item = [u32; 2]>| -> Vec<Vec3> {
             let segments: Vec<_> =
                 edges.map(|edge| mesh.spheres_of(edge).map(|s| s.centre)).collect();
@@ -459,10 +459,10 @@ fn partners(
     (other, other_graph): &(PreparedAxis, SheetGraph),
 ) -> Vec<Option<u32>> {
     let placed = place_on_triangles(&axis.triangles, MATCH_SAMPLES, 0).unwrap_or_default();
-    let points: Vec<Vec3> = placed.iter().map(|placed| placed.on(&axis.triangles)).collect();
+    let (faces, points): (Vec<usize>, Vec<Vec3>) = placed.into_iter().unzip();
     let mut found: Vec<Vec<u32>> = vec![Vec::new(); graph.areas.len()];
-    for (placed, closest) in placed.iter().zip(other.tree.closest_batch(&points)) {
-        let Some(sheet) = graph.sheet_of_face[placed.triangle] else { continue };
+    for (face, closest) in faces.into_iter().zip(other.tree.closest_batch(&points)) {
+        let Some(sheet) = graph.sheet_of_face[face] else { continue };
         // Curves and isolated spheres follow the faces.
         let there = other_graph.sheet_of_face.get(closest.face as usize).copied().flatten();
         found[sheet as usize].push(match there {

@@ -59,8 +59,10 @@ pub(super) fn swept(
     let forward = peaks_above(&side, triangles.collect(), (on_mesh, start), (known, share));
     let forward = boundary.proven(forward);
     let known = forward.iter().fold(known, |most, peak| most.max(peak.distance));
-    let side = SweptUnion::new(surface, boundary);
-    let reverse = peaks_above(&side, side.pieces(), (on_union, start), (known, share));
+    let Boundary { union, patches, .. } = boundary;
+    let side = SweptUnion { bvh: surface.1, triangles: planar_frames(surface.0), union, patches };
+    let pieces = patches.pieces().into_iter().map(|piece| (piece, None)).collect();
+    let reverse = peaks_above(&side, pieces, (on_union, start), (known, share));
     [forward, reverse]
 }
 
@@ -202,7 +204,7 @@ impl Surface for SweptSurface<'_> {
         if depth.upper + reach <= enough {
             return None;
         }
-        let above = patches.hulls.largest_over(deepest.primitive, corners);
+        let above = patches.largest_over(deepest.primitive, corners);
         // Inside, the distance grows away from the nearest point outside.
         let (gradient, here) = match deepest.signed < 0.0 {
             true => (depth.outside.map_or(Vec3::ZERO, |outside| centre - outside), depth.upper),
@@ -228,17 +230,6 @@ struct SweptUnion<'a> {
 /// A piece, the face that is closest to it and the primitive that is deepest there.
 type Hinted = (Piece, Option<(u32, Primitive)>);
 
-impl<'a> SweptUnion<'a> {
-    pub fn new((surface, bvh): (&TriMesh, &'a TriangleBvh), boundary: &'a Boundary<'a>) -> Self {
-        let Boundary { union, patches, .. } = boundary;
-        Self { bvh, triangles: planar_frames(surface), union, patches }
-    }
-
-    pub fn pieces(&self) -> Vec<Hinted> {
-        self.patches.pieces().into_iter().map(|piece| (piece, None)).collect()
-    }
-}
-
 impl Surface for SweptUnion<'_> {
     type Piece = Hinted;
 
@@ -258,7 +249,7 @@ impl Surface for SweptUnion<'_> {
         }
         let from_face = |face: u32| largest_distance(&self.triangles[face as usize], corners);
         if let Some((face, primitive)) = *hint
-            && (self.patches.hulls.largest_over(primitive, corners) < -EXPOSED
+            && (self.patches.largest_over(primitive, corners) < -EXPOSED
                 || from_face(face) <= enough)
         {
             return None;
