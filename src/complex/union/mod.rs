@@ -17,7 +17,7 @@
 use std::collections::HashSet;
 
 use rayon::prelude::*;
-use search::{Nearer, Part, Parts, Shape, Signed, Unsigned};
+use search::{Nearer, Part, Parts, Shape};
 
 use super::{ComplexError, MedialMesh};
 use crate::Vec3;
@@ -146,7 +146,8 @@ impl MedialUnion {
         if parts.is_empty() {
             return Err(UnionError::Empty);
         }
-        let balls = ball_box(&mesh.spheres);
+        let corners = |m: &Sphere| [m.centre - m.radius, m.centre + m.radius];
+        let balls = Bounds::of_points(mesh.spheres.iter().flat_map(corners));
         Ok(Self { parts: Parts::new(parts, balls), balls })
     }
 
@@ -186,7 +187,7 @@ impl MedialUnion {
     /// The primitive of least signed distance, searched as in [`signed_from`](Self::signed_from), or any whose
     /// distance is at most `enough`.
     pub(crate) fn deepest_or(&self, p: Vec3, near: &mut usize, enough: f64) -> NearestPrimitive {
-        self.parts.nearest::<Signed>(p, near, enough)
+        self.parts.nearest::<true>(p, near, enough)
     }
 
     /// The primitive of least signed distance, searched as in [`signed_from`](Self::signed_from), and the
@@ -220,7 +221,7 @@ impl MedialUnion {
     /// `mu(p)`: the least distance to the surface of a primitive, buried or not. Begun as in
     /// [`signed_from`](Self::signed_from).
     pub(crate) fn unsigned_from(&self, p: Vec3, near: &mut usize) -> f64 {
-        self.parts.nearest::<Unsigned>(p, near, f64::NEG_INFINITY).signed.abs()
+        self.parts.nearest::<false>(p, near, f64::NEG_INFINITY).signed.abs()
     }
 
     /// The primitive of least signed distance.
@@ -228,17 +229,12 @@ impl MedialUnion {
         self.deepest_or(p, &mut 0, f64::NEG_INFINITY)
     }
 
-    /// The primitive whose surface is nearest.
-    pub fn nearest_surface(&self, p: Vec3) -> NearestPrimitive {
-        self.parts.nearest::<Unsigned>(p, &mut 0, f64::NEG_INFINITY)
-    }
-
     /// [`signed`](Self::signed) for many points, in their order, in parallel.
     pub fn signed_batch(&self, points: &[Vec3]) -> Vec<f64> {
         in_morton_order(points, |last: &mut usize, p| self.signed_from(p, last))
     }
 
-    /// `mu`, the distances to the [nearest surfaces](Self::nearest_surface), for many points, in their order, in
+    /// `mu(p)`: the least distance to the surface of a primitive, buried or not, for many points, in their order, in
     /// parallel.
     pub fn unsigned_nearest_batch(&self, points: &[Vec3]) -> Vec<f64> {
         in_morton_order(points, |last: &mut usize, p| self.unsigned_from(p, last))
@@ -332,12 +328,6 @@ const RUN: usize = 512;
 
 /// Number of remembered primitives that buried a point.
 const RECENT: usize = 4;
-
-fn ball_box(balls: &[Sphere]) -> Bounds {
-    Bounds::of_points(
-        balls.iter().flat_map(|m| [-m.radius, m.radius].map(|r| m.centre + Vec3::splat(r))),
-    )
-}
 
 // Spheres that differ by no more than rounding.
 //

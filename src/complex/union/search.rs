@@ -1,6 +1,5 @@
 //! Searches among the primitives of a union.
 
-use std::marker::PhantomData;
 use std::ops::Range;
 
 use super::{NearestPrimitive, Primitive};
@@ -26,11 +25,16 @@ pub(super) trait UnionSearch {
 }
 
 impl Parts {
-    /// The nearest primitive by a reading of the distance, or the first one that is met whose distance is at most
+    /// The primitive of least distance, signed or absolute, or the first one that is met whose distance is at most
     /// `enough`. Begins with the one at `near`, which is then the place of the one that was found.
-    pub fn nearest<R: Reading>(&self, p: Vec3, near: &mut usize, enough: f64) -> NearestPrimitive {
+    pub fn nearest<const SIGNED: bool>(
+        &self,
+        p: Vec3,
+        near: &mut usize,
+        enough: f64,
+    ) -> NearestPrimitive {
         let signed = self.shape(*near).signed(p);
-        let mut search = Nearest::<R>::new(self, p, *near, signed, enough);
+        let mut search = Nearest::<SIGNED>::new(self, p, *near, signed, enough);
         search.tighten();
         if search.limit > f64::NEG_INFINITY {
             self.search(&mut search);
@@ -46,7 +50,7 @@ impl Parts {
             return None;
         }
         let enough = if any { limit.next_down() } else { f64::NEG_INFINITY };
-        let mut search = Nearest::<Signed>::new(self, p, NO_PLACE, limit, enough);
+        let mut search = Nearest::<true>::new(self, p, NO_PLACE, limit, enough);
         search.tighten();
         self.search(&mut search);
         let found = search.place != NO_PLACE;
@@ -158,39 +162,11 @@ fn depth_bound(node: &Node, p: Vec3) -> f64 {
     node.least_reach - node.bounds.farthest_squared(p).sqrt()
 }
 
-/// The distance, of two, that is minimised.
-pub(super) trait Reading {
-    const MEASURE: Measure;
-    fn value(signed: f64) -> f64;
-}
-
-pub(super) enum Signed {}
-
-impl Reading for Signed {
-    const MEASURE: Measure = Measure::Signed;
-
-    #[inline]
-    fn value(signed: f64) -> f64 {
-        signed
-    }
-}
-
-pub(super) enum Unsigned {}
-
-impl Reading for Unsigned {
-    const MEASURE: Measure = Measure::Unsigned;
-
-    #[inline]
-    fn value(signed: f64) -> f64 {
-        signed.abs()
-    }
-}
-
 /// No place: only primitives below the first value count.
 const NO_PLACE: usize = usize::MAX;
 
-/// Search for the nearest primitive.
-struct Nearest<'a, R> {
+/// Search for the nearest primitive, by signed distance or by its absolute value.
+struct Nearest<'a, const SIGNED: bool> {
     parts: &'a Parts,
     p: Vec3,
     place: usize,
@@ -199,15 +175,19 @@ struct Nearest<'a, R> {
     /// A distance that ends the search.
     enough: f64,
     limit: f64,
-    reading: PhantomData<R>,
 }
 
-impl<'a, R: Reading> Nearest<'a, R> {
+impl<'a, const SIGNED: bool> Nearest<'a, SIGNED> {
     /// Begins with the primitive at a place, and its signed distance.
     #[inline]
     fn new(parts: &'a Parts, p: Vec3, place: usize, signed: f64, enough: f64) -> Self {
-        let (value, limit) = (R::value(signed), f64::INFINITY);
-        Self { parts, p, place, signed, value, enough, limit, reading: PhantomData }
+        let (value, limit) = (Self::value(signed), f64::INFINITY);
+        Self { parts, p, place, signed, value, enough, limit }
+    }
+
+    #[inline]
+    fn value(signed: f64) -> f64 {
+        if SIGNED { signed } else { signed.abs() }
     }
 
     /// Sets the limit above the best value by more than both can be rounded; below everything if that value is enough.
@@ -221,8 +201,8 @@ impl<'a, R: Reading> Nearest<'a, R> {
     }
 }
 
-impl<R: Reading> UnionSearch for Nearest<'_, R> {
-    const MEASURE: Measure = R::MEASURE;
+impl<const SIGNED: bool> UnionSearch for Nearest<'_, SIGNED> {
+    const MEASURE: Measure = if SIGNED { Measure::Signed } else { Measure::Unsigned };
 
     #[inline]
     fn point(&self) -> Vec3 {
@@ -237,7 +217,7 @@ impl<R: Reading> UnionSearch for Nearest<'_, R> {
     #[inline]
     fn look(&mut self, place: usize) {
         let signed = self.parts.shape(place).signed(self.p);
-        let value = R::value(signed);
+        let value = Self::value(signed);
         if value < self.value
             || (value == self.value
                 && self.place != NO_PLACE

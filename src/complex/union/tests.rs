@@ -6,6 +6,7 @@ use rand_pcg::Pcg64;
 
 use super::search::Shape;
 use super::*;
+use crate::geometry::Slab;
 
 fn vector(rng: &mut Pcg64) -> Vec3 {
     Vec3::new(rng.random(), rng.random(), rng.random()) * 2.0 - Vec3::ONE
@@ -37,6 +38,12 @@ fn mesh(kind: &str, count: u32, rng: &mut Pcg64) -> MedialMesh {
             }
             "nested" => Sphere::new(1e-9 * centre, rng.random()),
             "far apart" => Sphere::new(centre * 10.0_f64.powi(rng.random_range(-6..7)), 1e-3),
+            // Balls in a ball, from inside towards its surface: along their cones the radius falls to nothing.
+            "spikes" => {
+                let size = if spheres.len() % 2 == 0 { 0.5 } else { 0.03 };
+                let radius = size * (1.0 + rng.random::<f64>()) / 2.0;
+                Sphere::new((1.0 - radius) * centre.normalize(), radius)
+            }
             _ => unreachable!("{kind}"),
         });
     }
@@ -79,22 +86,17 @@ fn results_are_those_of_all_primitives() {
         "clusters",
         "nested",
         "far apart",
+        "spikes",
     ];
     for kind in kinds {
         for count in [1, 2, 5, 40, 120] {
             let mesh = mesh(kind, count, &mut rng);
             let union = MedialUnion::new(&mesh).unwrap();
-            for query in 0..60 {
-                let p = match query % 4 {
-                    0 => vector(&mut rng),
-                    1 => mesh.spheres[rng.random_range(0..mesh.spheres.len())].centre,
-                    // On a surface.
-                    2 => {
-                        let m = mesh.spheres[rng.random_range(0..mesh.spheres.len())];
-                        m.centre + m.radius * vector(&mut rng).normalize()
-                    }
-                    _ => vector(&mut rng) * 10.0_f64.powi(rng.random_range(-3..5)),
-                };
+            let queries: Vec<Vec3> =
+                (0..60).map(|query| query_near(&mesh, query, &mut rng)).collect();
+            let signed = union.signed_batch(&queries);
+            let unsigned = union.unsigned_nearest_batch(&queries);
+            for (k, &p) in queries.iter().enumerate() {
                 // Spheres that another part covers have none of their own; they are nearer by
                 // rounding at most.
                 let own = all(&mesh, p);
@@ -102,23 +104,35 @@ fn results_are_those_of_all_primitives() {
                 let least = own().map(|part| part.0).fold(f64::INFINITY, f64::min);
                 let deepest = union.deepest(p);
                 assert_eq!(deepest.signed.to_bits(), least.to_bits(), "{kind}, {count}, {p}");
+                assert_eq!(signed[k].to_bits(), least.to_bits(), "{kind}, {count}, {p}");
                 let first = own().filter(|part| part.0 == least).map(|part| part.1).min();
                 assert_eq!(Some(deepest.primitive), first, "{kind}, {count}, {p}");
                 let nearest = own().map(|part| part.0.abs()).fold(f64::INFINITY, f64::min);
-                assert_eq!(
-                    union.nearest_surface(p).signed.abs().to_bits(),
-                    nearest.to_bits(),
-                    "{kind}, {p}"
-                );
+                assert_eq!(unsigned[k].to_bits(), nearest.to_bits(), "{kind}, {p}");
                 let depth = least + vector(&mut rng).x * 1e-7;
-                assert_eq!(union.buries(p, -depth), least < depth, "{kind}, {count}, {p}");
+                for depth in [depth, 0.0, -1e-3] {
+                    assert_eq!(union.buries(p, -depth), least < depth, "{kind}, {count}, {p}");
+                }
                 let below = union.below_batch(&[p], &[depth])[0].map(|found| found.signed);
                 assert_eq!(below, (least < depth).then_some(least), "{kind}, {count}, {p}");
                 let mut near = 0;
                 union.each_nearer(p, 0.1, |_, _| near += 1);
                 assert_eq!(near, own().filter(|part| part.0 < 0.1).count(), "{kind}, {p}");
             }
+            let unburied = signed.into_iter().enumerate().filter(|&(_, signed)| signed >= -1e-3);
+            assert_eq!(union.unburied(&queries, 1e-3), unburied.collect::<Vec<_>>(), "{kind}");
         }
+    }
+}
+
+/// A point at random, at a centre, on a sphere, or at any distance.
+fn query_near(mesh: &MedialMesh, query: usize, rng: &mut Pcg64) -> Vec3 {
+    let m = mesh.spheres[rng.random_range(0..mesh.spheres.len())];
+    match query % 4 {
+        0 => vector(rng),
+        1 => m.centre,
+        2 => m.centre + m.radius * vector(rng).normalize(),
+        _ => vector(rng) * 10.0_f64.powi(rng.random_range(-3..5)),
     }
 }
 
@@ -149,12 +163,28 @@ fn the_start_of_a_search_does_not_change_its_result() {
     }
 }
 
+/// The least distance to a whole sphere, cone or slab.
+fn least_of_hulls(mesh: &MedialMesh, p: Vec3) -> f64 {
+    let spheres = mesh.spheres.iter().map(|m| m.signed_distance(p));
+    let cones = mesh.edges.iter().map(|&edge| {
+        let [a, b] = mesh.spheres_of(edge);
+        Cone::new(a, b).signed_distance(p)
+    });
+    let slabs = mesh.faces.iter().map(|&f| Slab::new(mesh.spheres_of(f)).signed_distance(p));
+    spheres.chain(cones).chain(slabs).fold(f64::INFINITY, f64::min)
+}
+
 /// The representatives of equal parts are as near as any, to the tolerance of equality.
 #[test]
 fn no_primitive_is_nearer_than_its_part() {
     let mut rng = Pcg64::seed_from_u64(11);
-    for (kind, fewer) in [("cluster", true), ("nested", false), ("steep", false), ("points", false)]
-    {
+    for (kind, fewer) in [
+        ("cluster", true),
+        ("nested", false),
+        ("steep", false),
+        ("points", false),
+        ("scattered", false),
+    ] {
         for count in [1, 2, 5, 40, 120] {
             let mesh = mesh(kind, count, &mut rng);
             let union = MedialUnion::new(&mesh).unwrap();
@@ -162,7 +192,7 @@ fn no_primitive_is_nearer_than_its_part() {
             assert!(!fewer || 2 * union.parts.primitives().len() <= primitives.max(2), "{count}");
             for _ in 0..100 {
                 let p = vector(&mut rng) * 10.0_f64.powi(rng.random_range(-2..2));
-                let least = all(&mesh, p).iter().map(|part| part.0).fold(f64::INFINITY, f64::min);
+                let least = least_of_hulls(&mesh, p);
                 let found = union.signed(p);
                 let off = 6.0 * EQUAL + 1e-15 * (1.0 + p.length());
                 assert!((found - least).abs() <= off, "{kind}, {count}, {p}: {found} {least}");
