@@ -485,16 +485,25 @@ fn attached(regular: &Regular, isolated: &[bool]) -> Vec<u32> {
 
 // Regular triangulations of balls whose centres need not span space.
 
+/// The centres and squared radii of balls, the points and weights of their regular triangulation.
+///
+/// # Errors
+/// A radius that is negative or not finite.
+pub(super) fn weighted<'b>(
+    balls: impl IntoIterator<Item = &'b Sphere>,
+) -> Result<(Vec<Vec3>, Vec<f64>), TriangulationError> {
+    let balls = balls.into_iter().enumerate();
+    let pairs = balls.map(|(index, &Sphere { centre, radius })| match radius {
+        0.0..f64::INFINITY => Ok((centre, radius * radius)),
+        _ => Err(TriangulationError::Radius { index, radius }),
+    });
+    pairs.collect()
+}
+
 /// Triangulates balls with their squared radii as weights, with four anchors after them if that
 /// is needed to span space.
-pub(super) fn triangulated(balls: &[Sphere]) -> Result<Regular, TriangulationError> {
-    for (index, ball) in balls.iter().enumerate() {
-        if ball.radius < 0.0 || !ball.radius.is_finite() {
-            return Err(TriangulationError::Radius { index, radius: ball.radius });
-        }
-    }
-    let mut points: Vec<Vec3> = balls.iter().map(|b| b.centre).collect();
-    let mut weights: Vec<f64> = balls.iter().map(|b| b.radius * b.radius).collect();
+fn triangulated(balls: &[Sphere]) -> Result<Regular, TriangulationError> {
+    let (mut points, mut weights) = weighted(balls)?;
     match Regular::new(&points, &weights) {
         Err(error) if error.is_flat() => {}
         result => return result,

@@ -23,6 +23,7 @@
 
 use rayon::prelude::*;
 
+use crate::dual_complex::weighted;
 use crate::triangulation::{CellId, VertexId};
 use crate::{Delaunay, Regular, Sphere, TriangulationError, Vec3};
 
@@ -274,14 +275,7 @@ impl PowerCrust {
     /// # Errors
     /// A centre or radius that is not finite, a radius that is negative, as in [`Regular::new`].
     pub fn new(inner: &[Sphere], outer: &[Sphere]) -> Result<Self, TriangulationError> {
-        let balls = inner.iter().chain(outer);
-        for (index, ball) in balls.clone().enumerate() {
-            if ball.radius < 0.0 || !ball.radius.is_finite() {
-                return Err(TriangulationError::Radius { index, radius: ball.radius });
-            }
-        }
-        let mut points: Vec<Vec3> = balls.clone().map(|b| b.centre).collect();
-        let mut weights: Vec<f64> = balls.map(|b| b.radius * b.radius).collect();
+        let (mut points, mut weights) = weighted(inner.iter().chain(outer))?;
         points.extend(box_around(&points));
         weights.resize(points.len(), 0.0);
         let regular = Regular::new(&points, &weights)?;

@@ -135,18 +135,12 @@ pub(super) fn power_test(p: [(&[f64; 3], f64); 4], e: (&[f64; 3], f64)) -> Sign 
     let range = WeightRange::of(&weights).with(e.1);
     let (d, quantum) = differences(p.map(|q| q.0), e.0, range.quantum_cap());
     let unit = 2 * quantum;
-    // The limits leave room in a lift for three squares, a difference of weights and the sign.
-    match d {
-        Differences::One(d) if range.fits(122, unit) => {
+    match range.tier(d, unit) {
+        Tier::One(d) => {
             integers::lifted_sign(&d, &weights.map(|w: f64| to_i128(e.1, unit) - to_i128(w, unit)))
         }
-        Differences::One(d) if range.fits(250, unit) => {
-            in_sphere_det::<2, 4, 6, 10>(&widen(&d), &offsets(e.1, weights, unit))
-        }
-        Differences::Two(d) if range.fits(250, unit) => {
-            in_sphere_det::<2, 4, 6, 10>(&widen(&d), &offsets(e.1, weights, unit))
-        }
-        d => in_sphere_det::<20, 40, 60, 100>(&d.into_wide(), &offsets(e.1, weights, unit)),
+        Tier::Two(d) => in_sphere_det::<2, 4, 6, 10>(&d, &offsets(e.1, weights, unit)),
+        Tier::Any(d) => in_sphere_det::<20, 40, 60, 100>(&d, &offsets(e.1, weights, unit)),
     }
 }
 
@@ -178,10 +172,28 @@ impl WeightRange {
     }
 
     /// Whether weights in units of `2^unit` have at most this many bits.
-    pub(super) fn fits(self, bits: i32, unit: i32) -> bool {
+    fn fits(self, bits: i32, unit: i32) -> bool {
         // All weights are zero where there is no highest bit.
         self.top == i32::MIN || self.top - unit <= bits
     }
+
+    /// The narrowest tier that holds differences, and these weights in units of `2^unit`.
+    pub(super) fn tier<const K: usize>(self, differences: Differences<K>, unit: i32) -> Tier<K> {
+        // The limits leave room in a lift for three squares, a difference of weights and the sign.
+        match differences {
+            Differences::One(d) if self.fits(122, unit) => Tier::One(d),
+            Differences::One(d) if self.fits(250, unit) => Tier::Two(widen(&d)),
+            Differences::Two(d) if self.fits(250, unit) => Tier::Two(widen(&d)),
+            d => Tier::Any(d.into_wide()),
+        }
+    }
+}
+
+/// Differences of `K` points to an origin in the words of a tier.
+pub(super) enum Tier<const K: usize> {
+    One([[i64; 3]; K]),
+    Two([[Wide<2>; 3]; K]),
+    Any([[Wide<20>; 3]; K]),
 }
 
 /// The orthocentre of four weighted points minus `p[0]`, each coordinate correct to a few units
@@ -191,19 +203,11 @@ pub(super) fn orthocentre(p: [(&[f64; 3], f64); 4]) -> Option<[f64; 3]> {
     let range = WeightRange::of(&weights);
     let (d, quantum) = differences([p[1].0, p[2].0, p[3].0], p[0].0, range.quantum_cap());
     let ([first, others @ ..], unit) = (weights, 2 * quantum);
-    // Samples of plane faces have many nearly flat cells, so that narrow tiers matter. The limits are those of
-    // `power_test`.
-    match d {
-        Differences::One(d) if range.fits(122, unit) => {
-            cramer::<1, 2, 3, 4>(&widen(&d), &offsets(first, others, unit), quantum)
-        }
-        Differences::One(d) if range.fits(250, unit) => {
-            cramer::<2, 4, 6, 8>(&widen(&d), &offsets(first, others, unit), quantum)
-        }
-        Differences::Two(d) if range.fits(250, unit) => {
-            cramer::<2, 4, 6, 8>(&widen(&d), &offsets(first, others, unit), quantum)
-        }
-        d => cramer::<20, 40, 60, 80>(&d.into_wide(), &offsets(first, others, unit), quantum),
+    // Samples of plane faces have many nearly flat cells, so that narrow tiers matter.
+    match range.tier(d, unit) {
+        Tier::One(d) => cramer::<1, 2, 3, 4>(&widen(&d), &offsets(first, others, unit), quantum),
+        Tier::Two(d) => cramer::<2, 4, 6, 8>(&d, &offsets(first, others, unit), quantum),
+        Tier::Any(d) => cramer::<20, 40, 60, 80>(&d, &offsets(first, others, unit), quantum),
     }
 }
 
@@ -320,7 +324,7 @@ pub(super) enum Differences<const K: usize> {
 
 impl<const K: usize> Differences<K> {
     /// The same in the widest tier.
-    pub(super) fn into_wide(self) -> [[Wide<20>; 3]; K] {
+    fn into_wide(self) -> [[Wide<20>; 3]; K] {
         match self {
             Self::One(d) => widen(&d),
             Self::Two(d) => widen(&d),
