@@ -54,11 +54,9 @@ pub(crate) fn triangulation(bytes: &[u8]) {
     // Points that are not finite or out of range are rejected.
     if let Ok(delaunay) = Delaunay::new(&points) {
         delaunay.check().expect("a triangulation");
-        delaunay.check_geometry().expect("empty spheres");
     }
     if let Ok(regular) = Regular::new(&points, &weights) {
         regular.check().expect("a triangulation");
-        regular.check_geometry().expect("empty orthospheres");
     }
 }
 

@@ -116,7 +116,7 @@ impl CellSpheres {
                 side != Side::Inside || surface.any_within(centre, GUARD_BAND)
             });
         let mut outside: Vec<CellId> = outside.map(|((&cell, _), _)| CellId(cell)).collect();
-        leave_out(delaunay.triangulation(), &mut is_inside, &mut outside);
+        leave_out(delaunay, &mut is_inside, &mut outside);
         let moved = outside.into_par_iter().map(|cell| {
             let corners = delaunay.vertices(cell).map(|v| delaunay.point(v));
             let centre = nearest_within(corners, centre(cell.0));
@@ -134,7 +134,7 @@ impl CellSpheres {
     ) -> Self {
         let mut found =
             Self { circumspheres, moved, is_inside, kept: Vec::new(), in_guard_band: 0 };
-        let cells = delaunay.triangulation().finite_cells().filter(|&cell| found.is_inside(cell));
+        let cells = delaunay.finite_cells().filter(|&cell| found.is_inside(cell));
         let (cells, centres): (Vec<CellId>, Vec<Vec3>) =
             cells.filter_map(|cell| Some((cell, found.sphere(cell)?.centre))).unzip();
         found.kept = morton_order(&centres).into_iter().map(|(_, i)| cells[i as usize]).collect();
@@ -151,11 +151,6 @@ impl CellSpheres {
     /// [`Delaunay::circumspheres`].
     pub fn circumspheres(&self) -> &[Option<Sphere>] {
         &self.circumspheres
-    }
-
-    /// The spheres that are centred inside, in the order of the Voronoi medial mesh.
-    fn inner_spheres(&self) -> impl Iterator<Item = Sphere> + '_ {
-        self.kept.iter().filter_map(|&cell| self.sphere(cell))
     }
 
     /// Whether a cell is part of the solid, or else whether its circumcentre is inside; never for infinite cells.
@@ -232,12 +227,11 @@ pub fn voronoi_medial_mesh(
     samples: &Arc<[Vec3]>,
     dual: DualTriangulation,
 ) -> MedialMesh {
-    let triangulation = delaunay.triangulation();
     let kept = &cells.kept;
-    let sphere_of_cell = &cells.sphere_ids(triangulation.cell_count());
-    let spheres: Vec<Sphere> = cells.inner_spheres().collect();
+    let sphere_of_cell = &cells.sphere_ids(delaunay.cell_count());
+    let spheres: Vec<Sphere> = kept.iter().filter_map(|&cell| cells.sphere(cell)).collect();
     let edges = kept.par_iter().flat_map_iter(|&cell| {
-        let neighbours = triangulation.neighbours(cell).into_iter();
+        let neighbours = delaunay.neighbours(cell).into_iter();
         neighbours
             .filter(move |&other| other > cell && cells.is_inside(other))
             .map(move |other| [cell, other].map(|cell| sphere_of_cell[cell.index()]))
@@ -248,7 +242,7 @@ pub fn voronoi_medial_mesh(
         .expect("circumspheres are finite and ids in range");
     mesh.contacts = Some(Contacts {
         samples: Arc::clone(samples),
-        of_sphere: kept.iter().map(|&c| triangulation.vertices(c).map(|v| v.0)).collect(),
+        of_sphere: kept.iter().map(|&c| delaunay.vertices(c).map(|v| v.0)).collect(),
     });
     mesh
 }
@@ -339,17 +333,16 @@ impl VoronoiFacets {
     /// The facets in the order of the smallest cell of their Delaunay edge. Parallel; the same for
     /// any number of threads. Costs a turn around each edge for each of its cells.
     pub fn new(delaunay: &Delaunay, cells: &CellSpheres) -> Self {
-        let triangulation = delaunay.triangulation();
-        let sphere_of_cell = cells.sphere_ids(triangulation.cell_count());
+        let sphere_of_cell = cells.sphere_ids(delaunay.cell_count());
         let kept: Vec<CellId> =
-            triangulation.finite_cells().filter(|&cell| cells.is_inside(cell)).collect();
+            delaunay.finite_cells().filter(|&cell| cells.is_inside(cell)).collect();
         let parts: Vec<Self> = kept
             .par_chunks(1024)
             .map(|part| {
                 let mut facets = Self { start: vec![0], ..Self::default() };
                 for &cell in part {
                     for (i, j) in EDGES_OF_CELL {
-                        facets.push_dual(triangulation, &sphere_of_cell, cell, i, j);
+                        facets.push_dual(delaunay, &sphere_of_cell, cell, i, j);
                     }
                 }
                 facets
@@ -446,23 +439,10 @@ impl VoronoiFacets {
         for &sphere in polygons.chain(edges.as_flattened()).chain(vertices) {
             kept[sphere as usize] = true;
         }
-        let ids: Vec<u32> = (0..).zip(&kept).filter(|&(_, &k)| k).map(|(id, _)| id).collect();
-        let mut renumbered = vec![u32::MAX; kept.len()];
-        for (new, &old) in (0..).zip(&ids) {
-            renumbered[old as usize] = new;
-        }
-        let new = |old: u32| renumbered[old as usize];
-        let mut triangles = self.triangles(facets, &mesh.spheres, dual);
-        triangles.iter_mut().for_each(|triangle| *triangle = triangle.map(new));
-        let spheres = ids.iter().map(|&id| mesh.spheres[id as usize]).collect();
-        let edges = edges.iter().map(|edge| edge.map(new)).collect();
-        let mut sub = MedialMesh::from_simplices(spheres, edges, triangles)
+        let triangles = self.triangles(facets, &mesh.spheres, dual);
+        let whole = MedialMesh::from_simplices(mesh.spheres.clone(), edges.to_vec(), triangles)
             .expect("a part of a valid complex");
-        sub.contacts = mesh.contacts.as_ref().map(|contacts| Contacts {
-            samples: contacts.samples.clone(),
-            of_sphere: ids.iter().map(|&id| contacts.of_sphere[id as usize]).collect(),
-        });
-        sub
+        MedialMesh { contacts: mesh.contacts.clone(), ..whole }.induced(&kept)
     }
 }
 

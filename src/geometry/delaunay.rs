@@ -85,11 +85,6 @@ impl Delaunay {
         Ok(())
     }
 
-    /// The combinatorial triangulation.
-    pub fn triangulation(&self) -> &Triangulation {
-        &self.triangulation
-    }
-
     /// The combinatorial triangulation alone.
     pub fn into_triangulation(self) -> Triangulation {
         self.triangulation
@@ -172,23 +167,15 @@ impl Delaunay {
             .collect()
     }
 
-    /// Checks every invariant: [`check_combinatorics`](Triangulation::check_combinatorics), then
-    /// [`check_geometry`](Delaunay::check_geometry), which relies on it.
+    /// Checks every invariant exactly: the [combinatorics](Triangulation::check_combinatorics), that every cell is
+    /// positive, that every circumsphere is empty (facet by facet, which implies it globally), that the hull is
+    /// convex, and that every input point is a vertex or recorded as the duplicate of one.
     ///
     /// # Errors
     /// The first violation found.
     pub fn check(&self) -> Result<(), Violation> {
+        // The geometry relies on it.
         self.check_combinatorics()?;
-        self.check_geometry()
-    }
-
-    /// Checks exactly that every cell is positive, that every circumsphere is empty (facet by
-    /// facet, which implies it globally), that the hull is convex, and that every input point is a
-    /// vertex or recorded as the duplicate of one.
-    ///
-    /// # Errors
-    /// The first violation found.
-    pub fn check_geometry(&self) -> Result<(), Violation> {
         self.check_regularity::<Unweighted>(&self.sites, self.filter)?;
         for point in 0..self.sites.len() {
             let id = VertexId(point as u32);

@@ -111,11 +111,6 @@ impl Regular {
         Ok(Self { triangulation, sites, duplicates, hidden, filter })
     }
 
-    /// The combinatorial triangulation.
-    pub fn triangulation(&self) -> &Triangulation {
-        &self.triangulation
-    }
-
     /// The combinatorial triangulation alone.
     pub fn into_triangulation(self) -> Triangulation {
         self.triangulation
@@ -176,23 +171,15 @@ impl Regular {
         orthosphere(v.map(|v| self.point(v)), v.map(|v| self.weight(v)))
     }
 
-    /// Checks every invariant: [`check_combinatorics`](Triangulation::check_combinatorics), then
-    /// [`check_geometry`](Regular::check_geometry), which relies on it.
+    /// Checks every invariant exactly: the [combinatorics](Triangulation::check_combinatorics), that every cell is
+    /// positive, that no vertex across a facet is inside the orthosphere, that the hull is convex, and that every
+    /// hidden point is outside the orthosphere of the cell that contains it.
     ///
     /// # Errors
     /// The first violation found.
     pub fn check(&self) -> Result<(), Violation> {
+        // The geometry relies on it.
         self.check_combinatorics()?;
-        self.check_geometry()
-    }
-
-    /// Checks exactly that every cell is positive, that no vertex across a facet is inside the
-    /// orthosphere, that the hull is convex, and that every hidden point is outside the
-    /// orthosphere of the cell that contains it.
-    ///
-    /// # Errors
-    /// The first violation found.
-    pub fn check_geometry(&self) -> Result<(), Violation> {
         self.check_regularity::<Weighted>(&self.sites, self.filter)?;
         for &(point, kept) in &self.duplicates {
             if self.sites[point.index()] != self.sites[kept.index()] || self.is_vertex(point) {
