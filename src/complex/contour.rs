@@ -131,7 +131,12 @@ pub fn union_surface_within(
     }
     let longest = EDGE_SHARE * tolerance;
     let smallest = MIN_SHARE_OF_CELL * longest;
-    let mut grid = cube_around(&union, longest);
+    // A cube with the union in its inside. It is off centre by odd fractions, so that symmetric unions do not have
+    // their boundary run through vertices.
+    let (lo, hi) = union.bounding_box();
+    let extent = (hi - lo).max_element().max(longest);
+    let margin = 0.1 * extent * Vec3::new(0.731, 0.617, 0.849);
+    let mut grid = Bisection::of_cube(lo - margin, 1.2 * extent);
     let sizes: Vec<f64> = (0..=MAX_BISECTIONS).map(|g| grid.longest_edge(g)).collect();
     let goal = sizes.iter().position(|&s| s <= longest).unwrap_or(sizes.len() - 1) as u8;
     let refined = grid.refine(
@@ -169,15 +174,6 @@ pub fn union_surface_within(
     let surface = contract_short_edges(&raw, &limits, Folds::Refused).mesh;
     let lost = mesh.spheres.iter().filter(|m| m.radius < smallest).count();
     Ok(UnionSurface { mesh: surface, tetrahedra: grid.leaves.len(), lost, smallest })
-}
-
-/// A cube with the union in its inside. It is off centre by odd fractions, so that symmetric unions do not
-/// have their boundary run through vertices.
-fn cube_around(union: &MedialUnion, longest: f64) -> Bisection {
-    let (lo, hi) = union.bounding_box();
-    let extent = (hi - lo).max_element().max(longest);
-    let margin = 0.1 * extent * Vec3::new(0.731, 0.617, 0.849);
-    Bisection::of_cube(lo - margin, 1.2 * extent)
 }
 
 // The surface between tetrahedra's vertices inside and outside: marching tetrahedra.

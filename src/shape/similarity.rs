@@ -631,18 +631,19 @@ mod tests {
     use crate::surface::fixtures::cuboid;
     use crate::surface::{TriMesh, validate};
 
+    /// The shape of a surface, and its initial medial mesh in input units.
+    fn shape_of(mesh: &TriMesh, sampling: &str) -> (Shape, MedialMesh) {
+        let sampling = sampling.parse().unwrap();
+        let options = ShapeOptions { sampling, ..ShapeOptions::default() };
+        let shape = Shape::new("shape", mesh, validate(mesh).unwrap(), options).unwrap();
+        let axis = shape.initial().unwrap().to_input(shape.normalisation());
+        (shape, axis)
+    }
+
     /// A block of 3 by 2 by 1 somewhere, and its initial medial mesh.
     fn block() -> (Shape, MedialMesh) {
         let lower = Vec3::new(5.0, -4.0, 1.0);
-        let mesh = cuboid(lower, lower + Vec3::new(3.0, 2.0, 1.0));
-        let report = validate(&mesh).unwrap();
-        let sampling = "uniform:4000".parse().unwrap();
-        let options = ShapeOptions { sampling, ..ShapeOptions::default() };
-        let shape = Shape::new("block", &mesh, report, options).unwrap();
-        let normal = *shape.normalisation();
-        let initial = shape.initial().unwrap();
-        let axis = initial.to_input(&normal);
-        (shape, axis)
+        shape_of(&cuboid(lower, lower + Vec3::new(3.0, 2.0, 1.0)), "uniform:4000")
     }
 
     #[test]
@@ -710,13 +711,8 @@ mod tests {
     /// A corner at the origin holds any mesh that is far too small.
     #[test]
     fn a_mesh_that_is_far_too_small_has_other_units() {
-        let mesh = cuboid(Vec3::ZERO, Vec3::new(3.0, 2.0, 1.0));
-        let report = validate(&mesh).unwrap();
-        let sampling = "uniform:4000".parse().unwrap();
-        let options = ShapeOptions { sampling, ..ShapeOptions::default() };
-        let shape = Shape::new("corner", &mesh, report, options).unwrap();
-        let normal = *shape.normalisation();
-        let axis = shape.initial().unwrap().to_input(&normal);
+        let corner = cuboid(Vec3::ZERO, Vec3::new(3.0, 2.0, 1.0));
+        let (shape, axis) = shape_of(&corner, "uniform:4000");
         for scale in [1000.0, 25.4] {
             let written = axis.transformed(1.0 / scale, |p| p / scale);
             let fit = shape.fit_if_needed(&written).unwrap().expect("other units");
@@ -745,12 +741,7 @@ mod tests {
     #[test]
     fn a_coarse_mesh_in_the_right_units_has_no_others() {
         let bar = cuboid(Vec3::ZERO, Vec3::new(100.0, 4.0, 4.0));
-        let report = validate(&bar).unwrap();
-        let options =
-            ShapeOptions { sampling: "vertices".parse().unwrap(), ..ShapeOptions::default() };
-        let shape = Shape::new("bar", &bar, report, options).unwrap();
-        let normal = *shape.normalisation();
-        let initial = shape.initial().unwrap().to_input(&normal);
+        let (shape, initial) = shape_of(&bar, "vertices");
         assert!(shape.misfit(&initial).unwrap().unwrap() > 0.4);
         assert_eq!(shape.fit_if_needed(&initial).unwrap(), None);
         assert_eq!(shape.fit(&initial).unwrap().source, FitSource::Units);
@@ -780,9 +771,7 @@ mod tests {
     /// A ball that contains a globe with a margin: with a smaller scale its radius would fit.
     #[test]
     fn a_margin_of_the_radii_is_no_change_of_units() {
-        let globe = globe();
-        let report = validate(&globe).unwrap();
-        let shape = Shape::new("globe", &globe, report, ShapeOptions::default()).unwrap();
+        let (shape, _) = shape_of(&globe(), "conforming");
         for radius in [1.15, 1.3] {
             let ball = Sphere::new(Vec3::ZERO, radius);
             let mesh = MedialMesh::from_simplices(vec![ball], vec![], vec![]).unwrap();

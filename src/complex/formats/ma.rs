@@ -105,14 +105,23 @@ pub fn parse_ma(
 /// Writes a medial mesh as `.ma`.
 pub(super) fn write_ma(out: &mut dyn Write, mesh: &MedialMesh) -> io::Result<()> {
     writeln!(out, "{} {} {}", mesh.spheres.len(), mesh.edges.len(), mesh.faces.len())?;
+    write_records(out, mesh, ["v ", "e ", "f "])
+}
+
+/// Writes a line for each sphere, edge and face, with a text before those of each kind.
+pub(super) fn write_records(
+    out: &mut dyn Write,
+    mesh: &MedialMesh,
+    [sphere, edge, face]: [&str; 3],
+) -> io::Result<()> {
     for Sphere { centre: c, radius } in &mesh.spheres {
-        writeln!(out, "v {:.16e} {:.16e} {:.16e} {radius:.16e}", c.x, c.y, c.z)?;
+        writeln!(out, "{sphere}{:.16e} {:.16e} {:.16e} {radius:.16e}", c.x, c.y, c.z)?;
     }
     for [a, b] in &mesh.edges {
-        writeln!(out, "e {a} {b}")?;
+        writeln!(out, "{edge}{a} {b}")?;
     }
     for [a, b, c] in &mesh.faces {
-        writeln!(out, "f {a} {b} {c}")?;
+        writeln!(out, "{face}{a} {b} {c}")?;
     }
     Ok(())
 }

@@ -11,7 +11,7 @@ use std::io::{self, Write};
 
 use base64::prelude::{BASE64_STANDARD, Engine};
 
-use super::ma::canonical;
+use super::ma::{canonical, write_records};
 use super::{LoadedMa, MaError, MaErrorKind, Radii, ReadOptions};
 use crate::complex::{MedialMesh, Sphere, stability_ratio};
 use crate::surface::{Fault, Place, ply};
@@ -202,16 +202,7 @@ pub(super) fn write_ply(out: &mut dyn Write, mesh: &MedialMesh) -> io::Result<()
     writeln!(out, "property int vertex1\nproperty int vertex2")?;
     writeln!(out, "element face {}", mesh.faces.len())?;
     writeln!(out, "property list uchar int vertex_indices\nend_header")?;
-    for Sphere { centre: c, radius } in &mesh.spheres {
-        writeln!(out, "{:.16e} {:.16e} {:.16e} {radius:.16e}", c.x, c.y, c.z)?;
-    }
-    for [a, b] in &mesh.edges {
-        writeln!(out, "{a} {b}")?;
-    }
-    for [a, b, c] in &mesh.faces {
-        writeln!(out, "3 {a} {b} {c}")?;
-    }
-    Ok(())
+    write_records(out, mesh, ["", "", "3 "])
 }
 
 /// Writes the centres, edges and faces of a medial mesh as Wavefront OBJ.

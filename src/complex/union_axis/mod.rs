@@ -43,7 +43,7 @@
 //!   have a single Voronoi vertex and six such facets); here it is cut along that edge.
 //! * Where the spheres of several balls meet in one corner, polygons need not be convex.
 
-use corners::{Corners, Sectors, Voronoi};
+use corners::{Corners, Voronoi};
 use rayon::prelude::*;
 
 use super::MedialMesh;
@@ -138,7 +138,10 @@ impl UnionAxis {
             ..AxisTally::default()
         };
         let voronoi = corners::classify_sides(&corners, &sectors, &mut tally);
-        let mut sides = solid_sides(&sectors);
+        // Step 4 begins with the sides along edges of the dual complex.
+        let solid = sectors.all().iter().filter(|s| s.solid);
+        let mut sides =
+            solid.map(|s| Side { corners: s.corners, from: s.from, to: s.to }).collect();
         voronoi_sides(&corners, &voronoi, balls.len() as u32, &mut sides);
         let polygons = close_up(&sides, corners.with_anchors(), &mut tally);
         let mut edges: Vec<[u32; 2]> = lone_edges(&complex);
@@ -308,12 +311,6 @@ fn fan(v: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
     let first = (0..v.len()).min_by_key(|&k| v[k]).unwrap_or(0);
     let at = move |k: usize| v[(first + k) % v.len()];
     (1..v.len().saturating_sub(1)).map(move |k| [at(0), at(k), at(k + 1)])
-}
-
-/// The sides along edges of the dual complex.
-fn solid_sides(sectors: &Sectors) -> Vec<Side> {
-    let solid = sectors.all().iter().filter(|s| s.solid);
-    solid.map(|s| Side { corners: s.corners, from: s.from, to: s.to }).collect()
 }
 
 /// For each edge of a cell the indices of its other vertices: an even permutation.
