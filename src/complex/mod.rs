@@ -15,8 +15,8 @@ pub use conforming::{Conforming, ConformingError};
 pub use contour::{ContourError, UnionSurface, union_surface, union_surface_within};
 pub use formats::{
     LoadedMa, Look, MaError, MaErrorKind, READABLE, Radii, ReadOptions, SphereValues, WRITABLE,
-    left_out, parse_ma, parse_obj, parse_ply, read, read_content, read_with, single_precision_loss,
-    write, write_with,
+    holds_spheres_alone, left_out, parse_ma, parse_obj, parse_ply, read, read_content, read_with,
+    single_precision_loss, write, write_with,
 };
 pub use mesh::Incidence;
 pub use mesh::{ComplexError, Contacts, MedialMesh};

@@ -25,7 +25,7 @@ use std::path::Path;
 
 pub use glb::single_precision_loss;
 pub use ma::{parse_ma, parse_obj};
-pub use spheres::left_out;
+pub use spheres::{holds_spheres_alone, left_out};
 pub use viewers::{Look, SphereValues, parse_ply};
 
 use super::{ComplexError, MedialMesh};

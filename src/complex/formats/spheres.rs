@@ -83,6 +83,11 @@ fn layout(extension: &str) -> Option<&'static Layout> {
     LAYOUTS.iter().find(|layout| layout.0.contains(&extension))
 }
 
+/// Whether a file of this name holds spheres without edges and faces.
+pub fn holds_spheres_alone(path: impl AsRef<Path>) -> bool {
+    layout(&extension(path.as_ref())).is_some()
+}
+
 /// The elements of a medial mesh that a file of this name cannot hold, as a note; `None` if it holds all.
 ///
 /// ```
@@ -96,7 +101,9 @@ fn layout(extension: &str) -> Option<&'static Layout> {
 /// ```
 pub fn left_out(path: impl AsRef<Path>, mesh: &MedialMesh) -> Option<String> {
     let extension = extension(path.as_ref());
-    layout(&extension).filter(|_| !mesh.edges.is_empty())?;
+    if mesh.edges.is_empty() || !holds_spheres_alone(path) {
+        return None;
+    }
     let [edges, faces] = [(mesh.edges.len(), "edge"), (mesh.faces.len(), "face")]
         .map(|(count, one)| format!("{count} {one}{}", if count == 1 { "" } else { "s" }));
     Some(format!("left out {edges} and {faces}: .{extension} holds spheres alone"))
@@ -240,19 +247,41 @@ fn is_column(field: &str, name: &str) -> bool {
     field.trim_matches('"').eq_ignore_ascii_case(name)
 }
 
-/// The columns that a comment above the rows names, which have this many fields. Other comments are prose.
+/// The columns that a comment above the rows names by that many consecutive words. Other comments are prose, which must
+/// not speak of diameters.
 fn columns_of_comments(bytes: &[u8], count: usize) -> Option<Result<[usize; 4], String>> {
     const RADII: [&str; 4] = ["r", "radius", "d", "diameter"];
-    comments_above(bytes).iter().rev().find_map(|comment| {
-        let names = fields(comment, separator_of(comment));
-        let first = |name: &str| name.split([' ', '[', '(']).next().unwrap_or_default().to_owned();
-        let is_radius = |name: &&str| RADII.iter().any(|radius| is_column(&first(name), radius));
-        // Four words about the radius are prose.
-        let is_list = separator_of(comment).is_some();
-        let is_header = names.iter().any(|name| is_column(&first(name), "x"))
-            || is_list && names.iter().any(is_radius);
-        (names.len() == count && is_header).then(|| columns_of(&names))
+    let has = |names: &[&str], columns: &[&str]| {
+        names.iter().any(|name| columns.iter().any(|column| is_column(name, column)))
+    };
+    let comments = comments_above(bytes);
+    let parts = comments.iter().rev().flat_map(|comment| comment.split(':'));
+    let named = parts.filter_map(|part| {
+        let is_list = separator_of(part).is_some();
+        let listed = fields(part, separator_of(part)).into_iter().map(without_unit).collect();
+        let words = part.split([' ', '\t', ',', ';']).map(without_unit);
+        let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
+        [listed, words].into_iter().find_map(|names: Vec<&str>| {
+            // Four words about the radius are prose.
+            let is_header = |run: &&[&str]| match run.len() == names.len() {
+                true => has(run, &["x"]) || is_list && has(run, &RADII),
+                false => ["x", "y", "z"].iter().all(|axis| has(run, &[axis])) && has(run, &RADII),
+            };
+            names.windows(count).find(is_header).map(columns_of)
+        })
+    });
+    let is_diameter = |comment: &&String| comment.to_ascii_lowercase().contains("diameter");
+    named.into_iter().next().or_else(|| {
+        let found = quoted(comments.iter().find(is_diameter)?);
+        Some(Err(format!("unclear columns in a comment (found {found}, expected x,y,z,r)")))
     })
+}
+
+/// The first word of a name, without a unit in brackets.
+fn without_unit(name: &str) -> &str {
+    let word = name.split_whitespace().next().unwrap_or_default();
+    let word = if word.ends_with([']', ')']) { word } else { word.trim_start_matches(['[', '(']) };
+    word.split(['[', '(']).next().unwrap_or_default().trim_end_matches([']', ')'])
 }
 
 /// The places of `x`, `y`, `z` and the radius among the names of a header.
@@ -490,14 +519,28 @@ fn link_of<'a>(
     Ok(link)
 }
 
-/// Whether an item is a box, a cylinder or the like, by its type or its measures.
+/// Whether an item is a box, a capsule or the like: by the name of its kind, or by a measure that spheres do not have.
 fn is_other_shape(item: &Value) -> bool {
-    let of = |keys: &[&str]| keys.iter().find_map(|key| item.get(key));
-    match of(&["type", "shape"]).and_then(Value::as_str) {
-        Some(kind) => !kind.to_ascii_lowercase().contains("sphere"),
-        None => of(&["height", "length", "size", "dims", "dimensions", "extents"]).is_some(),
+    let kind = ["type", "shape", "kind", "geometry", "class"].iter().find_map(|key| item.get(key));
+    if let Some(kind) = kind.and_then(Value::as_str) {
+        return !kind.to_ascii_lowercase().contains("sphere");
     }
+    let is_measure = |value: &Value| match value {
+        Value::Array(list) => !list.is_empty() && list.iter().all(Value::is_number),
+        other => other.is_number(),
+    };
+    let mut entries = item.as_object().into_iter().flatten();
+    entries.any(|(key, value)| {
+        let key = key.to_ascii_lowercase();
+        is_measure(value) && !CENTRES.iter().chain(&OF_SPHERES).any(|known| *known == key)
+    })
 }
+
+/// Keys of numbers and vectors of spheres, other than [`CENTRES`].
+const OF_SPHERES: [&str; 20] = [
+    "radius", "r", "diameter", "position", "pos", "id", "index", "link", "parent", "group",
+    "label", "color", "colour", "rgb", "rgba", "opacity", "mass", "weight", "density", "volume",
+];
 
 fn no_centre() -> String {
     format!("none of the names of a center: {}", CENTRES.join(", "))
@@ -787,6 +830,8 @@ mod tests {
             ("x.csv", "# radius,x,y,z\n1,10,20,30\n", &[1.0]),
             ("x.csv", "# radius,x,y,z\n# units: m\n1,10,20,30\n", &[1.0]),
             ("x.csv", "# by a tool\n0,0,0,2\n", &[2.0]),
+            ("x.xyzr", "# columns: r x y z\n1 10 20 30\n", &[1.0]),
+            ("x.txt", "# the columns r[mm] x[mm] y[mm] z[mm]\n1 10 20 30\n", &[1.0]),
             ("x.json", "{\"tip\": {\"center\": [0, 0, 0], \"radius\": 2}, \"n\": 3}", &[2.0]),
             ("x.csv", "0, 0, 0, 1\r\n0, 0, 1, 2\r\n", &[1.0, 2.0]),
             ("x.csv", "\u{feff}\"x\";\"y\";\"z\";\"r\"\n0;0;0;1\n", &[1.0]),
@@ -795,6 +840,16 @@ mod tests {
             ("x.xyzr", "2\n0 0 0 1\n1 0 0 2\n", &[1.0, 2.0]),
             ("x.txt", "1 0 0 0\nv 0 0 0 3\n", &[3.0]),
             ("x.json", "[{\"origin\": [0, 0, 0], \"radius\": 1}]", &[1.0]),
+            (
+                "x.json",
+                "[{\"center\": [0, 0, 0], \"radius\": 1, \"id\": 3, \"rgb\": [1, 0, 0], \"on\": true}]",
+                &[1.0],
+            ),
+            (
+                "x.json",
+                "[{\"kind\": \"Sphere\", \"center\": [0, 0, 0], \"radius\": 1, \"scale\": 1}]",
+                &[1.0],
+            ),
             (
                 "x.json",
                 "[{\"center\": [0, 0, 0], \"radius\": 3}, {\"center\": [0, 0, 0], \"size\": [1, 1, 1]}]",
@@ -904,7 +959,12 @@ x.ply => ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nelement vert
 x.csv => x,y,z,r,radius\n0,0,0,5,1\n => , line 1: two columns of radii, r and radius
 x.csv => x,y,z,r,x\n0,0,0,5,1\n => , line 1: two columns x (found
 x.csv => # x,y,z,diameter\n0,0,0,5\n => , line 2: no column r (found "x,y,z,diameter"
-x.csv => # x [mm], y [mm], z [mm], diameter [mm]\n1,2,3,4\n => , line 2: no column x
+x.csv => # x [mm], y [mm], z [mm], diameter [mm]\n1,2,3,4\n => , line 2: no column r (found "x,y,z,diameter"
+x.xyzr => # x y z d (mm)\n0 0 0 1\n0 0 1 1\n => , line 2: no column r (found "x,y,z,d"
+x.xyzr => # x y z diameter [m]\n0 0 0 1\n => , line 2: no column r (found "x,y,z,diameter"
+x.txt => # 16 spheres: x y z diameter\n0 0 0 1\n => , line 2: no column r (found "x,y,z,diameter"
+x.txt => # 16 spheres, (x y z d) of each\n0 0 0 1\n => , line 2: no column r (found "x,y,z,d"
+x.csv => # center and diameter\n0,0,0,1\n => , line 2: unclear columns in a comment (found "center and diameter"
 x.csv => # x,y,z,diameter\n# by a tool\n0,0,0,5\n => , line 3: no column r
 x.xyzr => # r x y z\n2\n1 10 20 30\n2 3 4 5\n => : a comment names other columns
 x.json => [{"center": [0, 0, 0], "radius": 1, "child": {"center": [0, 0, 0], "radius": 1}}] => : 2 links (
@@ -916,6 +976,8 @@ x.json => [{"center": [0, 0, 0], "origin": [1, 0, 0], "radius": 1}] => : sphere 
 x.json => {"a": {"center": [0, 0, 0], "radius": 1}, "b": {"position": [1, 0, 0], "radius": 1}} => : b: none of the names
 x.json => {"a": {"center": [0, 0, 0], "radius": 1}, "b": {"center": [1, 0, 0], "Radius": 1}} => : b: the radius is missing
 x.json => [{"type": "cylinder", "center": [0, 0, 0], "radius": 1, "height": 2}] => : no spheres (found 1 other shapes)
+x.json => [{"kind": "capsule", "center": [0, 0, 0], "radius": 1}, {"class": "Box", "center": [0, 0, 0], "radius": 1}] => : no spheres (found 2 other shapes)
+x.json => [{"center": [0, 0, 0], "radius": 1, "half_length": 2}, {"center": [0, 0, 0], "radius": 1, "axis": [0, 0, 1]}] => : no spheres (found 2 other shapes)
 x.yaml => s:\n  - {center: [0, 0, 0], radius: 0,5} => : s, sphere 1: the key "5" is a number; write decimal points
 x.json => {\n] => , line 2:
 x.json => {"a": []} => : no spheres
