@@ -5,7 +5,7 @@
 //! `method.toml` with the claims of its authors. Folders come from others: links that lead out of them are refused.
 //! A surface instead of a medial mesh is the decimation baseline. Everything but the claimed seconds is measured here.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -119,7 +119,13 @@ impl Claims {
             depth = if c == '{' { depth + 1 } else { depth - usize::from(c == '}' && depth > 0) };
             c == '}' && depth == 0
         });
-        let is_entry = entry.starts_with('@') && end.is_some_and(|(at, _)| at + 1 == entry.len());
+        // Commands, unlike entries, affect the whole bibliography.
+        let kind = entry.strip_prefix('@').and_then(|rest| rest.split_once('{'));
+        let is_kind = kind.map(|(kind, _)| kind.trim().to_ascii_lowercase()).is_some_and(|kind| {
+            kind.bytes().all(|byte| byte.is_ascii_alphabetic())
+                && !["preamble", "string", "comment"].contains(&&*kind)
+        });
+        let is_entry = is_kind && end.is_some_and(|(at, _)| at + 1 == entry.len());
         (!entry.is_empty() && !is_entry)
             .then(|| "bibtex: expected one entry @type{key, ...} with balanced braces".to_owned())
     }
@@ -179,7 +185,7 @@ impl ExternalResult {
         if let Some(fault) = claims.fault() {
             return Err(format!("{}: {fault}", path.display()));
         }
-        let (mut files, mut skipped) = (Vec::new(), Vec::new());
+        let (mut files, mut skipped, mut stems) = (Vec::new(), Vec::new(), BTreeSet::new());
         for entry in fs::read_dir(folder).map_err(failed)? {
             let file = entry.map_err(failed)?.path();
             let extension = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -194,6 +200,7 @@ impl ExternalResult {
             let mesh = belonging.max_by_key(|mesh| mesh.len());
             let is_result =
                 complex::READABLE.iter().chain(&SURFACES).any(|known| *known == extension);
+            stems.insert(stem);
             if let Some(mesh) = mesh.filter(|_| is_result) {
                 check_inside(folder, &file)?;
                 // Folders come from others: a single file must not take all memory.
@@ -208,6 +215,10 @@ impl ExternalResult {
         // The order of a directory differs between systems.
         files.sort_by(|a, b| a.file.cmp(&b.file));
         skipped.sort();
+        if let Some(name) = claims.seconds.keys().find(|name| !stems.contains(*name)) {
+            let (path, name) = (path.display(), quoted(name));
+            return Err(format!("{path}: seconds of {name}: no file with this name in the folder"));
+        }
         if files.is_empty() {
             let known = meshes.join(", ");
             return Err(format!(
