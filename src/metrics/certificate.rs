@@ -57,6 +57,10 @@ const MAX_PIECES: [usize; 2] = [1 << 22, 1 << 24];
 /// Limit of pieces of a round for each initial piece, between the two of [`MAX_PIECES`].
 const MAX_GROWTH: usize = 64;
 
+/// Largest coordinate of a union, in the unit of the surface: rounding of several units in the last place is within
+/// [`ROUNDING`].
+const LARGEST_REACH: f64 = ROUNDING / (8.0 * f64::EPSILON);
+
 /// Encloses the Hausdorff distance in an interval no wider than `tolerance`, in the unit of both,
 /// for a surface of diagonal about 1. The same for any number of threads.
 ///
@@ -65,7 +69,7 @@ const MAX_GROWTH: usize = 64;
 ///
 /// # Errors
 /// A tolerance below [`FINEST`](super::FINEST) or not a number; an interval that would need too many pieces; a
-/// medial mesh without a union; a surface without faces.
+/// medial mesh without a union, or with one so large that rounding exceeds [`ROUNDING`]; a surface without faces.
 pub fn certify(
     surface: &TriMesh,
     bvh: &TriangleBvh,
@@ -77,6 +81,12 @@ pub fn certify(
         return Err(MetricError::NoArea);
     }
     let union = MedialUnion::new(mesh)?;
+    let (low, high) = union.bounding_box();
+    let reach = low.abs().max(high.abs()).max_element();
+    // No division narrows an interval below the rounding of its coordinates.
+    if reach > LARGEST_REACH {
+        return Err(MetricError::TooLarge { reach, most: LARGEST_REACH });
+    }
     let pose = Pose::new(surface);
     let boundary = Boundary::new(&union, Patches::new(mesh, pose.axes(), pose.diameter()));
     // Both ends are widened by ROUNDING below; half of one more covers the rounding of these sums.

@@ -34,6 +34,12 @@ pub enum MetricError {
         "tolerance {0}: cannot be certified (expected a fraction of the diagonal between 1e-6 and 1)"
     )]
     Tolerance(f64),
+    /// Spheres whose rounding no certificate covers.
+    #[error(
+        "spheres reach {reach:.1e} diagonals: too far for a certificate (expected at most {most:.0e}); remove them, or \
+         measure without one"
+    )]
+    TooLarge { reach: f64, most: f64 },
     /// The certificate would not fit into memory.
     #[error("tolerance {tolerance:.1e}: needs {pieces} pieces and more; choose a larger one")]
     TooFine { tolerance: f64, pieces: usize },

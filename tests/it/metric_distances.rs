@@ -591,6 +591,10 @@ fn uncertifiable_tolerances_are_rejected() {
         let refused = certify(&surface, &bvh, &mesh, tolerance);
         assert!(matches!(refused, Err(MetricError::Tolerance(_))), "{refused:?}");
     }
+    // Rounding of such a ball exceeds the tolerance.
+    let huge = complex(&[(Vec3::Z * -1e12, 1e12 + 1.0), (Vec3::ZERO, 0.1)], &[[0, 1]], &[]);
+    let refused = certify(&surface, &bvh, &huge, 1e-3);
+    assert!(matches!(refused, Err(MetricError::TooLarge { .. })), "{refused:?}");
     let empty = certify(&surface, &bvh, &MedialMesh::default(), 1e-3);
     assert!(matches!(empty, Err(MetricError::Union(_))));
 }
