@@ -331,11 +331,16 @@ pub(super) fn continuing(subject: &Subject<'_>) -> CaseResult {
     Ok(vec![])
 }
 
-/// Two complete runs without shared state.
+/// Two complete runs without shared state, and one with another seed, which must be declared to matter.
 pub(super) fn repeated(subject: &Subject<'_>) -> CaseResult {
     let first = subject.mesh(&corpus_shape("bracket"), 150)?;
     let second = subject.mesh(&corpus_shape("bracket"), 150)?;
-    same(&first, &second, 0.0, "the bracket: another result in a second run")
+    same(&first, &second, 0.0, "the bracket: another result in a second run")?;
+    if subject.method.info().seeded {
+        return Ok(vec![]);
+    }
+    let other = Subject { seed: 1, ..*subject }.mesh(&corpus_shape("bracket"), 150)?;
+    same(&first, &other, 0.0, "the bracket: another result with another seed; declare it seeded")
 }
 
 /// Other numbers of threads, for substrates and method alike.

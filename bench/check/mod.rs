@@ -30,6 +30,8 @@ pub struct Subject<'a> {
     pub method: &'a dyn MedialSimplifier,
     /// Its parameters.
     pub params: &'a Params,
+    /// The seed of its runs.
+    pub seed: u64,
     /// Whether it is an external program.
     pub external: bool,
     /// Gets each step before it starts, for the message about a method that has to be killed.
@@ -88,7 +90,11 @@ pub fn cases() -> &'static [Case] {
         case("native", "refuses invalid native levels, or all of them", native_level),
         case("published", "has a published level, or refuses it with a reason", published_level),
         case("continuing", "has the same result after other levels as alone", continuing),
-        case("repeated", "has the same result each time, bit by bit", repeated),
+        case(
+            "repeated",
+            "has the same result each time, bit by bit; with another seed too unless declared seeded",
+            repeated,
+        ),
         case("threads", "has the same result with 1, 2 and 5 threads", threads),
         case("scale", "has the same result in other units", scale),
         case("cancelled-before", "ends soon when cancelled before the start", cancelled_before),
@@ -120,7 +126,7 @@ impl Subject<'_> {
         let place = format!("preparing the {}", shape.name());
         (self.doing)(&place);
         self.method
-            .prepare(shape, self.params, &RunContext::default())
+            .prepare(shape, self.params, &RunContext::with_seed(self.seed))
             .map_err(|error| miss(&place, &error))
     }
 

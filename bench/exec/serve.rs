@@ -236,6 +236,7 @@ fn run_case(registry: &Registry, item: &CheckItem) -> io::Result<()> {
             let subject = Subject {
                 method: entry.method(),
                 params: &item.method.params,
+                seed: 0,
                 external: entry.fingerprint().is_some(),
                 // The supervisor notices by itself when the pipe is closed.
                 doing: &|what| drop(send(&Event::Doing(what.to_owned()))),

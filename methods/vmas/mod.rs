@@ -129,6 +129,7 @@ pub fn method() -> Method<VmasParams> {
              cluster, pushes it back to the medial axis, and splits the worst.",
         )
         .published("100 spheres, the default of the CGAL package")
+        .seeded()
         .params(VmasParams::describe());
     Method::new(info, prepare)
 }

@@ -59,6 +59,13 @@ fn every_method_passes_the_core_cases() {
     assert_eq!((code, object["passed"].as_u64()), (0, Some(3 * ids.len() as u64)), "{object}");
 }
 
+/// `compare --seeds` runs only such methods with each seed.
+#[test]
+fn a_method_whose_result_depends_on_the_seed_is_declared_seeded() {
+    let (code, object) = check(MEDIAL, &["vmas", "--set", "iterations=20", "--case", "repeated"]);
+    assert_eq!((code, ended(&object, "failed")), (0, vec![]));
+}
+
 #[test]
 #[ignore = "minutes; run nightly"]
 fn variants_pass() {
