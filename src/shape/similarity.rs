@@ -202,7 +202,11 @@ impl Shape {
         let spheres = surface.spheres(mesh);
         let mean = |s: &Similarity| surface.mean(&spheres, s);
         let boxes = surface.by_boxes(&spheres);
-        let exact: Vec<_> = surface.conventions().into_iter().chain(surface.factors()).collect();
+        // A mesh in a corner of the surface fits at any size, which the units of the file alone need not explain.
+        let fits_box = |s: &Similarity| (1.0 / FAR..FAR).contains(&(boxes.scale / s.scale));
+        let exact = surface.conventions().into_iter().chain(surface.factors());
+        let exact = exact.filter(|(source, s)| *source == FitSource::Units || fits_box(s));
+        let exact: Vec<_> = exact.collect();
         // Starts without a shift, and all.
         let plain = [surface.without_shift(boxes.scale)].into_iter();
         let plain =
@@ -224,7 +228,8 @@ impl Shape {
             }
         };
         let scaled = optimum(least(&mut plain.into_iter()), FitSource::Scaled);
-        let fitted = optimum(least(&mut all.chain([scaled.2])), FitSource::Fitted);
+        let all = all.chain(Some(scaled.2).filter(fits_box));
+        let fitted = optimum(least(&mut { all }), FitSource::Fitted);
         // The fewest free parameters that leave the union nearly as near as the optimum.
         let with_shift = PREFERENCE[1] * fitted.0;
         let enough = |has_no_shift: bool| {
@@ -241,8 +246,14 @@ impl Shape {
             false => surface.displacement(s, &fitted.2) <= of_fitted,
         };
         let best = exact.into_iter().map(|(source, s)| (nearness.of(&s), source, s));
+        let misfit = |s: &Similarity| median(&surface.residuals(&spheres, s)).unwrap_or(0.0);
         let best = best.filter(|(near, source, s)| {
-            *near <= enough(source.has_no_shift()) || is_within(*source, s)
+            *near <= enough(source.has_no_shift())
+                || is_within(*source, s)
+                // A shift that brings the union of a coarse mesh nearer can take the spheres out of place.
+                || source.has_no_shift()
+                    && *near <= PREFERENCE[0] * scaled.0
+                    && misfit(s) <= misfit(&fitted.2)
         });
         let best = best.min_by(|a, b| a.0.total_cmp(&b.0));
         let ((after, optima, normal), source) = match best {
@@ -250,8 +261,7 @@ impl Shape {
             None if scaled.0 <= enough(false) => (scaled, FitSource::Scaled),
             None => (fitted, FitSource::Fitted),
         };
-        let [before, misfit] = [&Similarity::IDENTITY, &normal]
-            .map(|s| median(&surface.residuals(&spheres, s)).unwrap_or(0.0));
+        let [before, misfit] = [&Similarity::IDENTITY, &normal].map(misfit);
         let is_free = matches!(source, FitSource::Scaled | FitSource::Fitted);
         let is_far = !(1.0 / FAR..FAR).contains(&normal.scale);
         let is_needed = misfit <= if is_free && !is_far { DOUBTFUL } else { FITTING }

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::command::{done, folder, json, refused, text_path};
+use crate::command::{done, folder, json, refused, text_path, words};
 
 #[test]
 fn axis_simplify_evaluate_convert() {
@@ -101,6 +101,54 @@ fn max_error_is_met() {
     assert!(object["spheres"].as_u64().expect("a count") < 200, "{object}");
     assert!(object["max_error"]["hausdorff"].as_f64().expect("a number") <= 0.02, "{object}");
     assert!(object["max_error"]["tried"].is_u64() && object["warnings"] == serde_json::json!([]));
+}
+
+/// A list of spheres has another error than the medial mesh that was measured.
+#[test]
+fn an_error_bound_is_that_of_the_written_file() {
+    let at = folder();
+    let path = at("x.csv");
+    let words =
+        ["simplify", "builtin:box:8", "--max-error", "0.1", "--samples", "500", "-o", &path];
+    // Continuing levels and others.
+    for method in ["qmat", "vmas"] {
+        refused(&[&words[..], &["-m", method]].concat(), 2, "write .ma, or name --method cover");
+    }
+    assert!(fs::metadata(&path).is_err());
+    done(&[&words[..], &["-m", "cover"]].concat());
+    let (_, object) = json(&["evaluate", "builtin:box:8", &path, "--samples", "500"]);
+    assert!(object["hausdorff"].as_f64().expect("a number") <= 0.1, "{object}");
+}
+
+/// Coarse results, whose radii fit other scales and shifts as well.
+#[test]
+fn exact_units_come_first_where_the_boxes_fit() {
+    let at = folder();
+    let (mesh, other) = (at("x.ma"), at("y.ma"));
+    for (method, spheres, scale, shift, source) in [
+        ("qmat", "20", 25.4, 0.0, "factor"),
+        ("qmat", "20", 1e-3, 0.0, "factor"),
+        ("vmas", "30", 1.7, 3.0, "fitted"),
+    ] {
+        done(&["simplify", "builtin:plate", "-m", method, "--spheres", spheres, "-o", &mesh]);
+        let text = fs::read_to_string(&mesh).expect("read");
+        let line = |line: &str| match line.strip_prefix("v ") {
+            None => line.to_owned() + "\n",
+            Some(numbers) => {
+                let numbers =
+                    words(numbers).into_iter().map(|n| n.parse::<f64>().expect("a number"));
+                let [x, y, z, r] = numbers.collect::<Vec<_>>()[..] else { panic!("{line}") };
+                let [x, y, z] = [x, y, z].map(|c| c * scale + shift);
+                format!("v {x} {y} {z} {}\n", r * scale)
+            }
+        };
+        fs::write(&other, text.lines().map(line).collect::<String>()).expect("written");
+        let (_, object) = json(&["evaluate", "builtin:plate", &other, "--fit", "auto"]);
+        let fit = &object["fit"];
+        assert_eq!(fit["source"], source, "{object}");
+        let back = fit["similarity"]["scale"].as_f64().expect("a scale") * scale;
+        assert!((back - 1.0).abs() < if source == "factor" { 1e-12 } else { 0.1 }, "{fit}");
+    }
 }
 
 #[test]
