@@ -1,5 +1,6 @@
 //! One method on one shape at one level, or within one error bound.
 
+use std::cell::Cell;
 use std::convert::Infallible;
 
 use medial::complex;
@@ -32,6 +33,8 @@ pub struct Request<'a> {
     pub judge: JudgeOptions,
     /// Whether a certificate proves the error bound instead of samples.
     pub certify: bool,
+    /// Whether the output drops edges and faces: the error of a result that has them is not that of its spheres.
+    pub spheres_alone: bool,
     /// Gets the name of each stage when it begins.
     pub on_stage: &'a dyn Fn(&str),
 }
@@ -107,7 +110,14 @@ impl Request<'_> {
             Ok(judge) => judge,
             Err(error) => return (failed(bound, SimplifyError::from(error).into()), None),
         };
+        let is_dropped = Cell::new(false);
+        let dropped = "the results have edges, which the output drops, and their error is not that of the spheres; write \
+                       .ma, or name --method cover";
         let measure = |mesh: &MedialMesh| -> Result<f64, String> {
+            if self.spheres_alone && !mesh.edges.is_empty() {
+                is_dropped.set(true);
+                return Err(dropped.to_owned());
+            }
             let sampled = judge.distances(mesh).map_err(|error| error.to_string())?.hausdorff;
             // Samples are a lower bound: above the error bound, no certificate is needed.
             if !self.certify || sampled > bound {
@@ -128,6 +138,9 @@ impl Request<'_> {
             trying: &|level| {
                 if context.is_cancelled() {
                     return Err(SimplifyError::Cancelled);
+                }
+                if is_dropped.get() {
+                    return Err(SimplifyError::Level(dropped.to_owned()));
                 }
                 (self.on_stage)(&format!("searching the bound: {level}"));
                 Ok(())

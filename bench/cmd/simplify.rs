@@ -93,6 +93,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         context: &RunContext::with_seed(seed).on_progress(line.steps()),
         judge: arguments.measure.judge_options(seed),
         certify: arguments.certify,
+        spheres_alone: arguments.output.as_deref().is_some_and(complex::holds_spheres_alone),
         on_stage: &|stage| line.at(stage),
     };
     let output = request.run(arguments.target()).map_err(|fault| arguments.failure(fault))?;

@@ -137,6 +137,7 @@ pub fn simplify(
             context,
             judge,
             certify: false,
+            spheres_alone: false,
             on_stage: &|stage| monitor.at(stage),
         };
         let RunOutput { simplify, result, search } =
