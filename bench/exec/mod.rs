@@ -270,7 +270,11 @@ impl<'a> Supervisor<'a> {
             // It ended while it was idle: try a new one.
             drop(worker);
             worker = self.worker_for(request)?;
-            worker.send(request).map_err(not_started)?;
+            match worker.send(request) {
+                // It ended at once: its status says why, when its output ends.
+                Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {}
+                sent => sent.map_err(not_started)?,
+            }
         }
         let (mut since, mut looked) = (Instant::now(), Instant::now());
         loop {
