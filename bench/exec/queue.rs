@@ -151,7 +151,8 @@ fn run_batch(
                 let records = &mut by_side[side];
                 if turn == 1 {
                     *records = lane[side].run(item)?;
-                    reasons(records).iter().for_each(|why| lock(desk).progress.remark(why));
+                    let (remarks, again) = (reasons(records), lane[side].take_again());
+                    remarks.iter().chain(&again).for_each(|it| lock(desk).progress.remark(it));
                 } else if records.iter().any(|record| record.status.has_result()) {
                     let again = lane[side].again(item, records)?;
                     merge(records, turn, again);

@@ -28,6 +28,19 @@ pub struct WorkerOptions {
     pub plugins: Vec<PathBuf>,
 }
 
+impl WorkerOptions {
+    /// The verb and its options.
+    pub fn arguments(&self) -> Vec<String> {
+        let (threads, bytes) = (self.threads.to_string(), self.bytes.to_string());
+        let mut words =
+            ["worker", "--threads", &threads, "--bytes", &bytes].map(str::to_owned).to_vec();
+        // Study files and arguments have UTF-8 paths.
+        let files = self.plugins.iter().map(|file| file.display().to_string());
+        words.extend(files.flat_map(|file| ["--plugins".to_owned(), file]));
+        words
+    }
+}
+
 pub struct Worker {
     child: Child,
     tree: Tree,
@@ -49,9 +62,7 @@ impl Worker {
             Some(program) => host::named(Command::new(program)),
             None => Host::here()?.command(),
         };
-        command.arg("worker").args(["--threads", &options.threads.to_string()]);
-        command.args(["--bytes", &options.bytes.to_string()]);
-        options.plugins.iter().for_each(|file| _ = command.arg("--plugins").arg(file));
+        command.args(options.arguments());
         // One folder for each worker: when it is killed, the files of its programs go with it.
         let scratch = tempfile::Builder::new().prefix("medial-").tempdir()?;
         command.env(SCRATCH, scratch.path());
