@@ -5,7 +5,7 @@ use std::path::Path;
 
 use medial::surface::SurfaceError;
 
-/// A file and its problem, or the problem of what was to be written, in one line.
+/// A file and its problem, or a record without a JSON form and the reason, in one line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct FileError(pub String);

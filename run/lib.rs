@@ -10,6 +10,7 @@
 //! | [`timed`], `search` | the timed run, the search for an error bound |
 //! | [`outcome`], [`record`], [`journal`] | from a result to a line of `results.jsonl` |
 //! | [`simplify`], [`evaluate`], [`reconstruct`] | the work of three verbs |
+//! | [`error`] | the errors of inputs and files |
 //! | [`hash`], [`text`] | hashes, numbers and names as text |
 
 pub mod axis;

@@ -141,10 +141,10 @@ pub fn fill_result(simplify: &mut Simplify, result: &Simplified) {
 pub fn count_fault(level: Target, result: &Simplified) -> Fault {
     let reached = result.mesh.spheres.len();
     match level {
-        Target::Spheres(asked) if !is_near(reached, asked) => {
+        Target::Spheres(requested) if !is_near(reached, requested) => {
             let why = result.diagnostics.warnings.join("; ");
             let why = if why.is_empty() { why } else { format!(": {why}") };
-            let reason = format!("{reached} spheres where {asked} were asked{why}");
+            let reason = format!("{reached} spheres where {requested} were requested{why}");
             Fault { status: Status::OtherCount, reason }
         }
         _ => Fault { status: Status::Ok, reason: String::new() },

@@ -70,7 +70,7 @@ pub(super) struct Sides<'a> {
     pub union: &'a MedialUnion,
 }
 
-/// The volumes, by cells along the axes of `pose`, of which the finest have `2^-depth` of the side of a box around both. The
+/// The volumes, by cells along the axes of `pose`. The finest cells are `2^-depth` of the side of a box around both. The
 /// same for any number of threads.
 ///
 /// # Errors

@@ -228,8 +228,8 @@ impl Shape {
             }
         };
         let scaled = optimum(least(&mut plain.into_iter()), FitSource::Scaled);
-        let all = all.chain(Some(scaled.2).filter(fits_box));
-        let fitted = optimum(least(&mut { all }), FitSource::Fitted);
+        let mut all = all.chain(Some(scaled.2).filter(fits_box));
+        let fitted = optimum(least(&mut all), FitSource::Fitted);
         // The fewest free parameters that leave the union nearly as near as the optimum.
         let with_shift = PREFERENCE[1] * fitted.0;
         let enough = |has_no_shift: bool| {

@@ -247,8 +247,8 @@ fn is_column(field: &str, name: &str) -> bool {
     field.trim_matches('"').eq_ignore_ascii_case(name)
 }
 
-/// The columns that a comment above the rows names by that many consecutive words. Other comments are prose, which must
-/// not speak of diameters.
+/// The columns named by `count` consecutive words of a comment above the rows. Other comments are prose; one about a
+/// diameter is an error.
 fn columns_of_comments(bytes: &[u8], count: usize) -> Option<Result<[usize; 4], String>> {
     const RADII: [&str; 4] = ["r", "radius", "d", "diameter"];
     let has = |names: &[&str], columns: &[&str]| {
