@@ -1,5 +1,7 @@
 //! A surface from a medial mesh: the boundary of its union, or the power crust.
 
+use std::cell::LazyCell;
+
 use medial::Vec3;
 use medial::complex::{ContourError, MedialMesh, MedialUnion, UnionSurface, union_surface};
 use medial::geometry::PowerCrust;
@@ -87,7 +89,8 @@ impl ReconstructError {
                 )
             }
             ContourError::TooThin { feasible, .. } => format!(
-                "every sphere is too thin for this tolerance; give a tolerance of {:.1e} for the largest",
+                "every sphere is too thin for this tolerance; give a tolerance of {:.1e} for the largest, or larger \
+                 radii",
                 feasible / diagonal
             ),
             other => return Self::input(other),
@@ -202,17 +205,17 @@ fn fitting_surface(
     tolerance: Option<f64>,
 ) -> Result<Fitting, ContourError> {
     let finest = tolerance.unwrap_or(FINE);
-    // Fails for too many balls.
-    let betti = union_betti(axis, BALL_SPACING * finest * diagonal).ok();
+    // Fails for too many balls. Not before the surface, which is refused sooner.
+    let betti = LazyCell::new(|| union_betti(axis, BALL_SPACING * finest * diagonal).ok());
     let at = |tolerance: f64| -> Result<Fitting, ContourError> {
         let made = union_surface(axis, tolerance * diagonal)?;
         let off = union.signed_batch(&face_centres(&made.mesh)).into_iter().map(f64::abs);
         let off = off.fold(0.0, f64::max) / diagonal;
-        Ok(Fitting { made, tolerance, off, betti })
+        Ok(Fitting { made, tolerance, off, betti: *betti })
     };
     let shows_all = |fitting: &Fitting| {
         let found = surface::validate(&fitting.made.mesh).ok().and_then(|report| betti_of(&report));
-        fitting.off <= FACES_WITHIN && found.is_some() && found == betti
+        fitting.off <= FACES_WITHIN && found.is_some() && found == fitting.betti
     };
     let coarse = if tolerance.is_none() { &COARSE[..] } else { &[] };
     // Coarse first: each halving costs eight times the cells.

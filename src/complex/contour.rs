@@ -68,6 +68,12 @@ pub enum ContourError {
     /// No part of the union is thick enough.
     #[error("no part of the union is as thick as {smallest:e}; use a tolerance below {feasible:e}")]
     TooThin { smallest: f64, feasible: f64 },
+    /// The tolerance is too fine for the memory, and coarser ones show no part of the union.
+    #[error(
+        "too thin for its extent (largest radius {largest:e}): a surface of it needs more than {most} tetrahedra; give \
+         larger radii"
+    )]
+    TooSlender { largest: f64, most: usize },
     /// All radii are zero.
     #[error("all spheres have radius zero: their union has no inside")]
     NoInside,
@@ -131,6 +137,11 @@ pub fn union_surface_within(
     }
     let longest = EDGE_SHARE * tolerance;
     let smallest = MIN_SHARE_OF_CELL * longest;
+    // With edges of half its radius, a ball certainly contains a vertex.
+    let too_thin = ContourError::TooThin { smallest, feasible: 0.5 * largest / EDGE_SHARE };
+    if largest < smallest {
+        return Err(too_thin);
+    }
     // A cube with the union in its inside. It is off centre by odd fractions, so that symmetric unions do not have
     // their boundary run through vertices.
     let (lo, hi) = union.bounding_box();
@@ -158,7 +169,12 @@ pub fn union_surface_within(
         // Feasible even if everything is thin and refined as far as possible.
         let size = sizes[usize::from(generation)] / MIN_SHARE_OF_CELL;
         let feasible = size / EDGE_SHARE * f64::max(1.0, (leaves as f64 / most as f64).sqrt());
-        ContourError::TooFine { tolerance, most, feasible }
+        // Coarser ones are too thin, up to a factor of 2 that leaves room for the rounding of an advice.
+        let shown = 0.5 * largest / (MIN_SHARE_OF_CELL * EDGE_SHARE);
+        match shown < feasible && shown <= 2.0 * tolerance {
+            true => ContourError::TooSlender { largest, most },
+            false => ContourError::TooFine { tolerance, most, feasible: feasible.min(shown) },
+        }
     })?;
     if sizes[usize::from(goal)] > longest {
         let feasible = sizes[usize::from(goal)] / EDGE_SHARE;
@@ -166,9 +182,7 @@ pub fn union_surface_within(
     }
     let (raw, edges) = march(&grid, &union);
     if raw.faces.is_empty() {
-        // With edges of half its radius, a ball certainly contains a vertex.
-        let feasible = 0.5 * largest / EDGE_SHARE;
-        return Err(ContourError::TooThin { smallest, feasible });
+        return Err(too_thin);
     }
     let limits: Vec<f64> = edges.iter().map(|length| CONTRACTED * length).collect();
     let surface = contract_short_edges(&raw, &limits, Folds::Refused).mesh;

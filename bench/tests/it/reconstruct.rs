@@ -92,13 +92,17 @@ fn requests_without_a_surface_are_refused() {
     let empty = write("empty.ma", "0 0 0\n");
     let points = write("points.ma", "2 1 0\nv 0 0 0 0\nv 1 0 0 0\ne 0 1\n");
     let specks = write("specks.ma", "2 0 0\nv 0 0 0 1e-6\nv 1 0 0 1e-6\n");
+    let sheet = write(
+        "sheet.ma",
+        "3 3 1\nv 0 0 0 0\nv 1 0 0 1e-6\nv 0 1 0 0\ne 0 1\ne 1 2\ne 0 2\nf 0 1 2\n",
+    );
     let huge = write("huge.ma", "1 0 0\nv 0 0 0 1e200\n");
     let far = write("far.ma", "1 0 0\nv 1e15 0 0 1\n");
     let (out, nowhere) = (at("x.ply"), at("no/such/folder/x.ply"));
     let mesh = "builtin:sphere:8";
     let crust = ["--method", "power-crust"];
     let crust_of = ["--method", "power-crust", "--mesh", mesh];
-    let cases: [(&[&str], &[&str], i32, &str); 12] = [
+    let cases: [(&[&str], &[&str], i32, &str); 14] = [
         (&[&ball, "-o", "x.stl"], &[], 1, "(found \"stl\", expected one of .ply"),
         (&[&ball, "-o", &nowhere], &[], 1, "the folder does not exist; create it by `mkdir -p"),
         (&["no-such.ma", "-o", &out], &[], 1, "no-such.ma"),
@@ -109,6 +113,8 @@ fn requests_without_a_surface_are_refused() {
         (&[&empty, "-o", &out], &[], 1, "empty.ma"),
         (&[&points, "-o", &out], &[], 1, "points.ma: all spheres have radius zero"),
         (&[&specks, "-o", &out], &[], 1, "specks.ma: every sphere is too thin"),
+        (&[&sheet, "-o", &out], &[], 1, "sheet.ma: every sphere is too thin"),
+        (&[&sheet, "-o", &out], &["--tolerance", "1e-5"], 1, "give larger radii"),
         (&[&huge, "-o", &out], &[], 1, "huge.ma"),
         (&[&far, "-o", &out], &crust_of, 1, "far.ma"),
     ];
