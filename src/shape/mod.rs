@@ -99,6 +99,8 @@ struct Triangulated {
     /// For each finite cell whether it is in the solid, where the surface is part of the triangulation; or why it
     /// is not, though that was requested.
     is_inside: Result<Vec<bool>, Option<String>>,
+    /// Doubt about the topology of the cells inside.
+    doubt: Option<String>,
 }
 
 impl Triangulated {
@@ -115,8 +117,14 @@ impl Triangulated {
             _ => Err(ConformingError::Crossing),
         };
         match found {
-            Ok(Conforming { delaunay, is_inside, .. }) => {
-                Ok(Self { delaunay: Arc::new(delaunay), is_inside: Ok(is_inside) })
+            Ok(Conforming { delaunay, is_inside, missing, .. }) => {
+                let doubt = (missing > 0).then(|| {
+                    format!(
+                        "the initial medial mesh may have another topology than the solid: parts of the surface are too \
+                         close to each other for samples ({missing} faces)"
+                    )
+                });
+                Ok(Self { delaunay: Arc::new(delaunay), is_inside: Ok(is_inside), doubt })
             }
             Err(ConformingError::Triangulation(error)) => Err(error),
             Err(why) => {
@@ -130,7 +138,8 @@ impl Triangulated {
     }
 
     fn plain(samples: &[Vec3]) -> Result<Self, TriangulationError> {
-        Ok(Self { delaunay: Arc::new(Delaunay::new(samples)?), is_inside: Err(None) })
+        let delaunay = Arc::new(Delaunay::new(samples)?);
+        Ok(Self { delaunay, is_inside: Err(None), doubt: None })
     }
 }
 
@@ -465,7 +474,10 @@ impl Shape {
     /// Why [`Sampling::Conforming`] could not be had, once the samples are triangulated.
     pub fn sampling_warning(&self) -> Option<String> {
         let (triangulated, _) = self.store.of_samples.delaunay.get()?;
-        triangulated.as_ref().ok()?.is_inside.as_ref().err()?.clone()
+        match &**triangulated.as_ref().ok()? {
+            Triangulated { is_inside: Err(why), .. } => why.clone(),
+            Triangulated { doubt, .. } => doubt.clone(),
+        }
     }
 
     fn triangulated(&self) -> Result<Arc<Triangulated>, ShapeError> {
@@ -501,7 +513,7 @@ impl Shape {
         let tree = self.surface_tree()?;
         let inside = self.inside_test();
         self.built(Substrate::Inside, &self.store.of_samples.cells, || {
-            let Triangulated { delaunay, is_inside } = &*triangulated;
+            let Triangulated { delaunay, is_inside, .. } = &*triangulated;
             Ok(Arc::new(match is_inside {
                 Ok(known) => CellSpheres::of_cells(delaunay, known.clone(), &inside, &tree),
                 Err(_) => CellSpheres::classify(delaunay, &inside, &tree),

@@ -2,10 +2,17 @@
 
 use super::skin::{Skin, key, sides};
 use super::stars::Stars;
+use crate::Vec3;
 use crate::geometry::predicates::projection_axis;
 
 /// Least cosine of the angles between the normals of the four triangles of a flip between patches (30 degrees).
 const STRAIGHT: f64 = 0.866;
+
+/// Largest distance between the two diagonals of a flip between patches, as a fraction of the surface's diagonal.
+const BEND: f64 = 3e-3;
+
+/// Height of a triangle, as a fraction of the surface's diagonal, below which its normal means nothing.
+const NEEDLE: f64 = 1e-6;
 
 impl Skin {
     /// Flips diagonals that are no Delaunay edges to those that are.
@@ -63,10 +70,27 @@ impl Skin {
     /// close.
     fn is_nearly_flat(&self, corners: [u32; 4]) -> bool {
         let [a, b, c, d] = corners.map(|v| self.points[v as usize]);
-        let normals = [[a, b, c], [b, a, d], [a, d, c], [d, b, c]]
-            .map(|[p, q, r]| (q - p).cross(r - p).normalize_or_zero());
+        let normals = [[a, b, c], [b, a, d], [a, d, c], [d, b, c]].map(|[p, q, r]| {
+            let longest = [p - q, q - r, r - p].map(Vec3::length).into_iter().fold(0.0, f64::max);
+            let normal = (q - p).cross(r - p);
+            (normal.normalize_or_zero(), normal.length() / longest)
+        });
+        let are_straight = |least: f64| {
+            let normals: Vec<Vec3> =
+                normals.iter().filter(|&&(_, height)| height >= least).map(|&(n, _)| n).collect();
+            (0..normals.len()).all(|i| (0..i).all(|j| normals[i].dot(normals[j]) >= STRAIGHT))
+        };
         let [first, second] = [b - a, d - c];
-        let apart = first.cross(second).normalize_or_zero().dot(c - a).abs();
-        apart <= self.bend && (0..4).all(|i| (0..i).all(|j| normals[i].dot(normals[j]) >= STRAIGHT))
+        let across = first.cross(second);
+        let apart = across.normalize_or_zero().dot(c - a).abs();
+        if apart <= BEND * self.diagonal && are_straight(0.0) {
+            return true;
+        }
+        // Next to a needle the diagonals have to cross: the lines through them can come close anywhere.
+        let needle = NEEDLE * self.diagonal;
+        let place = |along: Vec3| (c - a).cross(along).dot(across) / across.length_squared();
+        apart <= needle
+            && are_straight(needle)
+            && [second, first].into_iter().all(|along| (0.0..=1.0).contains(&place(along)))
     }
 }

@@ -14,6 +14,9 @@ const SHORTEST: f64 = 0.2;
 /// split to the next one. A smaller share gives fewer rounds and more points.
 const NEAR: f64 = 0.25;
 
+/// Length of a segment and radius of a circle, as fractions of the surface's diagonal, below which no point is added.
+const RESOLUTION: f64 = 1e-9;
+
 impl Skin {
     /// Steps 2 and 3: adds points for the missing triangles, and splits the surface at them.
     pub fn refine(&mut self, missing: &[u32], stars: &mut Stars<'_>) {
@@ -44,7 +47,9 @@ impl Skin {
         }
         for edge in split {
             let [p, q] = edge.map(|v| self.points[v as usize]);
-            if !fresh.any_within(p.midpoint(q), NEAR * p.distance(q)) {
+            if p.distance(q) > RESOLUTION * self.diagonal
+                && !fresh.any_within(p.midpoint(q), NEAR * p.distance(q))
+            {
                 let at = self.point_of_segment(edge, stars);
                 self.split_edge(edge, at);
                 fresh.insert(at);
@@ -63,7 +68,9 @@ impl Skin {
             let patch = self.patch[t as usize];
             let points = new.entry(patch).or_default();
             // A point of this round may have made the triangle another one.
-            if points.iter().any(|p| p.distance(centre) < radius) {
+            if points.iter().any(|p| p.distance(centre) < radius)
+                || radius < RESOLUTION * self.diagonal
+            {
                 continue;
             }
             let at = match self.locate(t, centre) {
@@ -76,6 +83,13 @@ impl Skin {
                     at
                 }
                 Place::Edge(edge) => {
+                    // A walk among needles can end at a vertex.
+                    let is_end = |v: u32| {
+                        self.points[v as usize].distance(centre) < RESOLUTION * self.diagonal
+                    };
+                    if edge.into_iter().any(is_end) {
+                        continue;
+                    }
                     self.split_edge(edge, centre);
                     centre
                 }
@@ -118,14 +132,14 @@ impl Skin {
 }
 
 /// Points by the cell of a grid.
-struct PointGrid {
+pub(super) struct PointGrid {
     cell: f64,
     all: Vec<Vec3>,
     by_cell: HashMap<[i64; 3], Vec<Vec3>>,
 }
 
 impl PointGrid {
-    fn new(cell: f64) -> Self {
+    pub fn new(cell: f64) -> Self {
         Self { cell, all: Vec::new(), by_cell: HashMap::new() }
     }
 
@@ -133,12 +147,12 @@ impl PointGrid {
         (p / self.cell).floor().to_array().map(|place| place as i64)
     }
 
-    fn insert(&mut self, p: Vec3) {
+    pub fn insert(&mut self, p: Vec3) {
         self.all.push(p);
         self.by_cell.entry(self.place(p)).or_default().push(p);
     }
 
-    fn any_within(&self, centre: Vec3, radius: f64) -> bool {
+    pub fn any_within(&self, centre: Vec3, radius: f64) -> bool {
         let is_within = |p: &Vec3| p.distance(centre) < radius;
         // A large sphere covers more cells than there are points.
         if radius > 4.0 * self.cell {

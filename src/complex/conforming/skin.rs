@@ -18,14 +18,12 @@ use crate::surface::TriMesh;
 /// inserted. Below it the triangulation decides.
 const COCIRCULAR: f64 = 1e-9;
 
-/// Largest distance between the two diagonals of a flip between patches, as a fraction of the surface's diagonal.
-const BEND: f64 = 3e-3;
-
 /// Limit of flips for each triangle of a call. Triangles of a patch are flat only up to rounding, for which the proof that
 /// flipping ends does not hold.
 const FLIPS: usize = 100;
 
 /// The surface, refined.
+#[derive(Clone)]
 pub(super) struct Skin {
     pub points: Vec<Vec3>,
     /// Counter-clockwise as seen from outside.
@@ -34,8 +32,8 @@ pub(super) struct Skin {
     pub patch: Vec<u32>,
     /// For each patch the coordinate axis along which it is projected, and the sense of its triangles there.
     pub plane: Vec<Option<(usize, Sign)>>,
-    /// Largest distance between the two diagonals of a flip between patches.
-    pub bend: f64,
+    /// Diagonal of the bounding box.
+    pub diagonal: f64,
     /// The triangle of each directed edge.
     pub across: HashMap<u64, u32, BuildHasherDefault<KeyHasher>>,
     /// Triangles that were set since [`Skin::with_changed`].
@@ -57,7 +55,7 @@ impl Skin {
             points: surface.vertices.clone(),
             patch: vec![0; triangles.len()],
             plane: Vec::new(),
-            bend: 0.0,
+            diagonal: 0.0,
             across: HashMap::with_capacity_and_hasher(
                 3 * triangles.len(),
                 BuildHasherDefault::default(),
@@ -78,6 +76,13 @@ impl Skin {
 
     pub fn corners(&self, t: u32) -> [Vec3; 3] {
         self.triangles[t as usize].map(|v| self.points[v as usize])
+    }
+
+    /// Whether an edge is longer than a fraction of the diagonal.
+    pub fn is_coarse(&self, length: f64) -> bool {
+        let edges = self.triangles.iter().flat_map(|&t| sides(t));
+        let ends = edges.map(|edge| edge.map(|v| self.points[v as usize]));
+        ends.into_iter().any(|[a, b]| a.distance(b) > length * self.diagonal)
     }
 
     pub fn opposite(&self, t: u32, [a, b]: [u32; 2]) -> u32 {
@@ -103,8 +108,8 @@ impl Skin {
         }
         let low = self.points.iter().copied().fold(Vec3::INFINITY, Vec3::min);
         let high = self.points.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
-        let tolerance = flat * low.distance(high);
-        self.bend = BEND * low.distance(high);
+        self.diagonal = low.distance(high);
+        let tolerance = flat * self.diagonal;
         let normal = |t: u32| {
             let [a, b, c] = self.corners(t);
             (b - a).cross(c - a)

@@ -1,0 +1,109 @@
+//! Points of the surface that shrink balls of the start that reach far out of the solid.
+
+use rayon::prelude::*;
+
+use super::Refinement;
+use super::refine::PointGrid;
+use super::skin::{Place, Skin, key, sides};
+use crate::Vec3;
+use crate::surface::TriangleBvh;
+
+/// Distance to a segment below which a point moves onto it, as a share of the tolerated depth.
+const SNAP: f64 = 0.25;
+
+/// A ball that is too large for its place.
+struct Protrusion {
+    /// Radius less the distance from the centre to the surface.
+    depth: f64,
+    centre: Vec3,
+    radius: f64,
+    /// The point of the surface nearest to the centre, and its triangle.
+    foot: Vec3,
+    triangle: u32,
+}
+
+impl Refinement {
+    /// Whether a ball of a cell inside contains a point of the surface deeper than a fraction of the diagonal.
+    pub fn has_protrusions(&self, depth: f64) -> bool {
+        !self.protrusions(depth * self.skin.diagonal).is_empty()
+    }
+
+    /// Adds points until every such ball contains one of them. Each is at least as far from all vertices as three quarters
+    /// of the depth, so that the area of the surface bounds their number.
+    pub fn split_protrusions(&mut self, depth: f64) {
+        let depth = depth * self.skin.diagonal;
+        let mut protrusions = self.protrusions(depth);
+        // The deepest first.
+        protrusions.sort_by(|a, b| b.depth.total_cmp(&a.depth));
+        let mut fresh = PointGrid::new(depth);
+        for Protrusion { centre, radius, foot, triangle, .. } in protrusions {
+            if !fresh.any_within(centre, radius)
+                && let Some(at) = self.skin.split_at(triangle, foot, SNAP * depth)
+            {
+                fresh.insert(at);
+            }
+        }
+    }
+
+    fn protrusions(&self, depth: f64) -> Vec<Protrusion> {
+        let Self { skin, delaunay, is_inside, .. } = self;
+        // A ball without vertices inside reaches beyond a triangle no deeper than the triangle's points are far from its
+        // corners, which is at most the longest side divided by the root of three.
+        let is_large = |t: &u32| {
+            let squared = sides(skin.triangles[*t as usize])
+                .map(|edge| edge.map(|v| skin.points[v as usize]))
+                .map(|[a, b]| a.distance_squared(b));
+            let is_flat = skin.plane[skin.patch[*t as usize] as usize].is_some();
+            is_flat && squared.into_iter().any(|squared| squared > 3.0 * depth * depth)
+        };
+        let large: Vec<u32> = (0..skin.triangles.len() as u32).filter(is_large).collect();
+        let corners: Vec<[Vec3; 3]> = large.iter().map(|&t| skin.corners(t)).collect();
+        let Ok(tree) = TriangleBvh::from_triangles(&corners) else { return Vec::new() };
+        let spheres = delaunay.circumspheres();
+        let balls = spheres.par_iter().zip(is_inside).filter(|&(_, &is_inside)| is_inside);
+        let found = balls.filter_map(|(sphere, _)| {
+            let sphere = sphere.filter(|sphere| sphere.radius > depth)?;
+            let foot = tree.closest_within_from(sphere.centre, sphere.radius - depth, None)?;
+            Some(Protrusion {
+                depth: sphere.radius - foot.distance,
+                centre: sphere.centre,
+                radius: sphere.radius,
+                foot: foot.point,
+                triangle: large[foot.face as usize],
+            })
+        });
+        found.collect()
+    }
+}
+
+impl Skin {
+    /// Adds a point of a triangle that other points of this round may have split. None where the way to it leaves the patch.
+    fn split_at(&mut self, triangle: u32, p: Vec3, snap: f64) -> Option<Vec3> {
+        let place = self.locate(triangle, p);
+        let edge = match place {
+            Place::Edge(edge) => Some(edge),
+            Place::Triangle(t) => sides(self.triangles[t as usize]).into_iter().find(|&edge| {
+                self.is_segment(t, edge) && self.nearest_on(edge, p).distance(p) < snap
+            }),
+        };
+        let Some(edge) = edge else {
+            let Place::Triangle(t) = place else { return None };
+            self.split_triangle(t, p);
+            return Some(p);
+        };
+        let is_segment = self.is_segment(self.across[&key(edge)], edge);
+        let at = if is_segment { self.nearest_on(edge, p) } else { p };
+        if at.distance(p) > snap {
+            return None;
+        }
+        self.split_edge(edge, at);
+        Some(at)
+    }
+
+    /// The point of an edge that is nearest to another point.
+    fn nearest_on(&self, edge: [u32; 2], p: Vec3) -> Vec3 {
+        let [a, b] = edge.map(|v| self.points[v as usize]);
+        let along = b - a;
+        a + along * ((p - a).dot(along) / along.length_squared()).clamp(0.0, 1.0)
+    }
+}
