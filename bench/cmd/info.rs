@@ -1,7 +1,7 @@
 //! `medial info MESH`: counts, defects and topology of a mesh, even of a refused one.
 
 use clap::Args;
-use medial::surface::{self, SurfaceReport};
+use medial::surface::{self, Loaded, SurfaceReport};
 use medial_run::input::{Input, Source};
 use medial_run::text::significant;
 
@@ -18,22 +18,31 @@ pub struct Arguments {
 /// Runs the verb. A refused mesh is described as far as possible, with exit code 1. Fails when the file cannot be read.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let source = Source::parse(&arguments.mesh)?;
-    let (report, refusal) = match source.path() {
+    let (report, refusal, solid) = match source.path() {
         Some(path) => {
             // Unlike a reader it continues at a defect: a defective mesh is the usual reason for this verb.
             let inspection = surface::inspect(path).map_err(Failure::input)?;
-            (inspection.report, inspection.refused)
+            match inspection.resolved.map(|solid| *solid) {
+                Some(Loaded { report: solid, .. }) => (inspection.report, None, Some(solid)),
+                None => (inspection.report, inspection.refused, None),
+            }
         }
-        None => (Input::load(&source)?.report, None),
+        None => (Input::load(&source)?.report, None, None),
     };
     if global.json {
         let mut object = serde_json::to_value(&report).map_err(Failure::input)?;
         let reason = refusal.as_ref().map(ToString::to_string);
         object["usable"] = reason.is_none().into();
         object["reason"] = reason.into();
+        object["solid"] = serde_json::to_value(&solid).map_err(Failure::input)?;
         print_json(&object, &report.warnings);
     } else {
-        print_report(&source, &report);
+        print_line(&source.to_string());
+        print_report(&report);
+        if let Some(solid) = &solid {
+            print_line("the solid that all other verbs use");
+            print_report(solid);
+        }
     }
     match refusal {
         None => Ok(Exit::Done),
@@ -45,14 +54,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     }
 }
 
-fn print_report(source: &Source, report: &SurfaceReport) {
+fn print_report(report: &SurfaceReport) {
     let yes = |flag: bool| if flag { "yes" } else { "no" };
     let intersecting = match report.intersecting_pairs {
         0 => "none".to_owned(),
         pairs if report.intersecting_pairs_complete => format!("{pairs} pairs of faces"),
         pairs => format!("more than {pairs} pairs of faces"),
     };
-    print_line(&source.to_string());
     let genus = report.genus.map_or_else(|| "undefined".to_owned(), |genus| genus.to_string());
     let lines = [
         ("vertices", report.vertices.to_string()),

@@ -46,7 +46,7 @@ pub(super) fn orient_and_examine(repaired: Repaired) -> Inspection {
     let wrong = topology.component.iter().map(|&c| wrong.get(c as usize) == Some(&true));
     topology::turn_over(&mut mesh.faces, wrong);
     report.repairs = repairs;
-    Inspection { mesh, report, refused: fault.map(Into::into), file: None }
+    Inspection { mesh, report, refused: fault.map(Into::into), resolved: None, file: None }
 }
 
 /// Examines a mesh as it is: nothing is repaired, every defect is a fault.

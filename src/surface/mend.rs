@@ -3,12 +3,10 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::PI;
 
-use super::check::orient_and_examine;
-use super::repair::repair;
 use super::report::{Fault, Repair, VertexName};
 use super::soup::PolygonSoup;
 use super::topology::Topology;
-use super::{Inspection, Loaded, SurfaceError, TriMesh};
+use super::{Inspection, Loaded, SurfaceError, TriMesh, inspected};
 use crate::Vec3;
 
 /// Which parts of a surface are kept.
@@ -77,8 +75,11 @@ fn mended(inspection: Inspection, options: MendOptions) -> Result<Loaded, Surfac
     if options.fill_holes {
         repairs.extend(fill(&vertices, &mut faces)?);
     }
-    let soup = PolygonSoup::of_triangles(&vertices, &faces)?;
-    let mut loaded = orient_and_examine(repair(soup)?).solid()?;
+    let mended = inspected(PolygonSoup::of_triangles(&vertices, &faces)?)?;
+    if mended.resolved.is_some() {
+        warnings.clear();
+    }
+    let mut loaded = mended.solid()?;
     repairs.append(&mut loaded.report.repairs);
     loaded.report.repairs = repairs;
     warnings.retain(|warning| !loaded.report.warnings.contains(warning));

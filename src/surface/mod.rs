@@ -25,6 +25,7 @@ mod repair;
 mod report;
 mod sample;
 mod shrinking_ball;
+mod solid;
 mod soup;
 mod stl;
 mod text;
@@ -65,6 +66,8 @@ pub struct Inspection {
     pub report: SurfaceReport,
     /// The error of [`read`] for this surface, if any.
     pub refused: Option<SurfaceError>,
+    /// The solid that the surface means, if it crosses, overlaps or touches itself.
+    pub resolved: Option<Box<Loaded>>,
     /// Name of the file in errors.
     file: Option<PathBuf>,
 }
@@ -75,9 +78,10 @@ impl Inspection {
     /// # Errors
     /// [`Inspection::refused`].
     pub fn solid(self) -> Result<Loaded, SurfaceError> {
-        match self.refused {
-            Some(error) => Err(error),
-            None => Ok(Loaded { mesh: self.mesh, report: self.report }),
+        match (self.resolved, self.refused) {
+            (Some(solid), _) => Ok(*solid),
+            (None, Some(error)) => Err(error),
+            (None, None) => Ok(Loaded { mesh: self.mesh, report: self.report }),
         }
     }
 }
@@ -165,8 +169,7 @@ pub fn inspect_bytes(path: impl AsRef<Path>, bytes: &[u8]) -> Result<Inspection,
 /// # Ok::<(), surface::SurfaceError>(())
 /// ```
 pub fn read_triangles(vertices: &[Vec3], faces: &[[u32; 3]]) -> Result<Loaded, SurfaceError> {
-    let soup = soup::PolygonSoup::of_triangles(vertices, faces)?;
-    check::orient_and_examine(repair::repair(soup)?).solid()
+    inspected(soup::PolygonSoup::of_triangles(vertices, faces)?)?.solid()
 }
 
 /// Checks a mesh that was not read from a file. Nothing is repaired: repeated corners, duplicate
@@ -194,8 +197,17 @@ pub fn validate(mesh: &TriMesh) -> Result<SurfaceReport, SurfaceError> {
 }
 
 fn examine(bytes: &[u8], format: Format) -> Result<Inspection, Fault> {
-    let repaired = repair::repair(format::parse(bytes, format)?)?;
-    Ok(check::orient_and_examine(repaired))
+    inspected(format::parse(bytes, format)?)
+}
+
+fn inspected(mut soup: soup::PolygonSoup) -> Result<Inspection, Fault> {
+    let repaired = repair::repair(&mut soup)?;
+    let unit = repaired.unit;
+    let mut inspection = check::orient_and_examine(repaired);
+    if inspection.refused.is_some() || inspection.report.self_intersecting {
+        inspection.resolved = solid::resolve(&soup, unit, &inspection).map(Box::new);
+    }
+    Ok(inspection)
 }
 
 fn in_file(path: &Path, fault: Fault) -> SurfaceError {

@@ -40,12 +40,12 @@ pub(super) struct Repaired {
 }
 
 /// Repairs a soup as far as indices go; orientation comes later.
-pub(super) fn repair(mut soup: PolygonSoup) -> Result<Repaired, Fault> {
+pub(super) fn repair(soup: &mut PolygonSoup) -> Result<Repaired, Fault> {
     let unit = Unit::of(&soup.vertices);
     let flushed = flush(unit, &mut soup.vertices);
     let welds = weld(&soup.vertices);
     let merged = welds.iter().enumerate().filter(|&(i, &w)| i != w as usize).count();
-    let mut repaired = build(&soup, unit, &welds)?;
+    let mut repaired = build(soup, unit, &welds, Duplicates::Dropped)?;
     let unreferenced = soup.vertices.len() - repaired.vertices.len() - merged;
     let first = [
         Repair::FlushedCoordinates { coordinates: flushed },
@@ -54,7 +54,7 @@ pub(super) fn repair(mut soup: PolygonSoup) -> Result<Repaired, Fault> {
     let last = Repair::DroppedUnreferencedVertices { vertices: unreferenced };
     let all = first.into_iter().chain(repaired.repairs).chain([last]);
     repaired.repairs = all.filter(|r| r.count() > 0).collect();
-    repaired.warnings.splice(0..0, soup.warnings);
+    repaired.warnings.splice(0..0, soup.warnings.clone());
     Ok(repaired)
 }
 
@@ -81,10 +81,45 @@ fn weld(vertices: &[Vec3]) -> Vec<u32> {
     (0..).zip(bits).map(|(i, bits)| *first.entry(bits).or_insert(i)).collect()
 }
 
+/// For each vertex the first one that is not farther away than a distance and stays itself.
+pub(super) fn weld_within(vertices: &[Vec3], distance: f64) -> Vec<u32> {
+    if distance == 0.0 {
+        return weld(vertices);
+    }
+    let place = |v: Vec3| (v / distance).floor().to_array().map(|x| x as i64);
+    let mut kept: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+    let mut near = |(i, &v): (u32, &Vec3)| {
+        let [x, y, z] = place(v);
+        let around = (0..27).map(|k| [x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1]);
+        let candidates = around.filter_map(|cell| kept.get(&cell)).flatten().copied();
+        let first = candidates.filter(|&k| vertices[k as usize].distance(v) <= distance).min();
+        first.unwrap_or_else(|| {
+            kept.entry([x, y, z]).or_default().push(i);
+            i
+        })
+    };
+    (0..).zip(vertices).map(|pair| near(pair)).collect()
+}
+
+/// Treatment of faces with the same corners as an earlier one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Duplicates {
+    Dropped,
+    Kept,
+}
+
 /// Steps 3 to 6, with vertices replaced by those they are welded to.
-fn build(soup: &PolygonSoup, unit: Unit, welds: &[u32]) -> Result<Repaired, Fault> {
+pub(super) fn build(
+    soup: &PolygonSoup,
+    unit: Unit,
+    welds: &[u32],
+    repeated: Duplicates,
+) -> Result<Repaired, Fault> {
     let (polygons, collapsed) = merge_corners(soup, welds);
-    let duplicate = duplicates(&polygons);
+    let duplicate = match repeated {
+        Duplicates::Dropped => duplicates(&polygons),
+        Duplicates::Kept => vec![false; polygons.len()],
+    };
     let points = unit.forward_all(&soup.vertices);
     let mut faces = Vec::with_capacity(polygons.corners.len().saturating_sub(2 * polygons.len()));
     let mut triangulator = Triangulator::new(polygons.corners.len());

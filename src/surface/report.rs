@@ -271,6 +271,10 @@ pub enum Repair {
         /// The longest way that one was moved, in the unit of the file.
         largest_move: f64,
     },
+    /// Vertices within a distance were merged, which closed the surface.
+    WeldedWithin { vertices: usize, distance: f64 },
+    /// Faces that crossed, overlapped or touched were replaced by the boundary of the region with a winding number of at least 1.
+    ResolvedFaces { faces: usize, by: usize },
     /// A hole was closed by triangles between its vertices, on demand.
     FilledHole { edges: usize, triangles: usize },
     /// Outer shells that pointed inward as a whole were turned over.
@@ -285,14 +289,28 @@ impl Repair {
         self.changed().0
     }
 
+    /// Whether the surface is another set of points afterwards, if only slightly.
+    pub fn changes_geometry(&self) -> bool {
+        matches!(
+            self,
+            Self::WeldedWithin { .. }
+                | Self::ResolvedFaces { .. }
+                | Self::SeparatedVertices { .. }
+                | Self::FilledHole { .. }
+                | Self::DroppedComponents { .. }
+        )
+    }
+
     /// The number of changed elements, and the noun for one of them.
     fn changed(&self) -> (usize, &'static str) {
         match *self {
             Self::FlushedCoordinates { coordinates } => (coordinates, "coordinate"),
             Self::WeldedVertices { vertices }
+            | Self::WeldedWithin { vertices, .. }
             | Self::SeparatedVertices { vertices, .. }
             | Self::DroppedUnreferencedVertices { vertices } => (vertices, "vertex"),
             Self::DroppedDegenerateFaces { faces }
+            | Self::ResolvedFaces { faces, .. }
             | Self::DroppedDuplicateFaces { faces }
             | Self::ReorientedFaces { faces } => (faces, "face"),
             Self::TriangulatedPolygons { polygons, .. } => (polygons, "polygon"),
@@ -336,6 +354,16 @@ impl fmt::Display for Repair {
             }
             Self::SeparatedVertices { largest_move, .. } => {
                 write!(f, "separated parts at {what}, by {largest_move:.3e} at most")
+            }
+            Self::WeldedWithin { distance, .. } => {
+                write!(
+                    f,
+                    "merged {what} within {distance:.1e} of another, which closes the surface"
+                )
+            }
+            Self::ResolvedFaces { by, .. } => {
+                let new = counted(by, "face");
+                write!(f, "replaced {what} that cross, overlap or touch by {new} around the solid")
             }
             Self::FilledHole { edges, .. } => {
                 write!(f, "filled a hole of {} with {what}", counted(edges, "edge"))
