@@ -54,7 +54,7 @@ use stars::Stars;
 use crate::Vec3;
 use crate::geometry::triangulation::Facet;
 use crate::geometry::{CellId, Delaunay, DisjointSets, TriangulationError};
-use crate::surface::{InsideTest, Side, TriMesh};
+use crate::surface::{InsideTest, Side, TriMesh, TriangleBvh};
 
 /// Limit of rounds of refinement.
 const ROUNDS: usize = 1_000;
@@ -146,8 +146,10 @@ impl Conforming {
                 Err(ConformingError::Crossing) => continue,
                 conforming => conforming?,
             }
-            if refinement.skin.is_coarse(COARSE) || refinement.has_protrusions(FAR) {
-                refinement.approach();
+            if (refinement.skin.is_coarse(COARSE) || refinement.has_protrusions(FAR))
+                && let Ok(tree) = TriangleBvh::new(surface)
+            {
+                refinement.approach(&tree);
             }
             return Ok(refinement.finish());
         }
@@ -221,10 +223,10 @@ impl Refinement {
 
     /// Step 6: adds points until all balls end near the surface, or the limit is reached. A round that gives up patches is
     /// undone.
-    fn approach(&mut self) {
+    fn approach(&mut self, surface: &TriangleBvh) {
         for _ in 0..APPROACHES {
             let mut next = self.clone();
-            next.split_protrusions(CLOSE);
+            next.split_protrusions(CLOSE, surface);
             let (before, after) = (self.skin.points.len(), next.skin.points.len());
             if before == after || after - self.begin >= self.most {
                 return;

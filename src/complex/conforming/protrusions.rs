@@ -11,6 +11,9 @@ use crate::surface::TriangleBvh;
 /// Distance to a segment below which a point moves onto it, as a share of the tolerated depth.
 const SNAP: f64 = 0.25;
 
+/// Distance from the surface, as a fraction of its diagonal, that is rounding.
+const ROUNDING: f64 = 1e-12;
+
 /// A ball that is too large for its place.
 struct Protrusion {
     /// Radius less the distance from the centre to the surface.
@@ -30,7 +33,8 @@ impl Refinement {
 
     /// Adds points until every such ball contains one of them. Each is at least as far from all vertices as three quarters
     /// of the depth, so that the area of the surface bounds their number.
-    pub fn split_protrusions(&mut self, depth: f64) {
+    /// The points are moved from flipped triangles to the surface itself.
+    pub fn split_protrusions(&mut self, depth: f64, surface: &TriangleBvh) {
         let depth = depth * self.skin.diagonal;
         let mut protrusions = self.protrusions(depth);
         // The deepest first.
@@ -40,6 +44,11 @@ impl Refinement {
             if !fresh.any_within(centre, radius)
                 && let Some(at) = self.skin.split_at(triangle, foot, SNAP * depth)
             {
+                let on_surface = surface.closest(at);
+                let moved = on_surface.distance > ROUNDING * self.skin.diagonal;
+                if let Some(last) = self.skin.points.last_mut().filter(|_| moved) {
+                    *last = on_surface.point;
+                }
                 fresh.insert(at);
             }
         }
