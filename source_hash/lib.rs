@@ -26,7 +26,7 @@ pub fn digest(root: &Path, files: &[PathBuf]) -> String {
     hasher.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The Rust files below a folder, without those below `without`, sorted.
+/// The Rust files below a folder, without those below `without` and files of tests, sorted.
 pub fn sources(folder: &Path, without: &[&str]) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).expect("a folder of sources") {
@@ -36,6 +36,7 @@ pub fn sources(folder: &Path, without: &[&str]) -> Vec<PathBuf> {
             found.extend(sources(&path, &[]));
         } else if path.extension().is_some_and(|extension| extension == "rs")
             && !without.contains(&name.as_str())
+            && name != "tests.rs"
         {
             found.push(path);
         }

@@ -1,4 +1,4 @@
-//! The choice and the connection against their definitions.
+//! The choice of spheres of Coverage Axis and their connection against their definitions.
 
 use medial::Vec3;
 use medial::simplifier::Params;

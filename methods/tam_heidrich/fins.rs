@@ -1,4 +1,4 @@
-//! Step 1, section 3: facets between duplicate corners.
+//! Step 1 of Tam and Heidrich, section 3: facets between duplicate corners.
 //!
 //! The axis of the perturbed balls has a *fin* between any two corners that are one sample: a facet that
 //! crosses a sheet or, where three sheets meet, reaches from the seam to the outside. If the two corners

@@ -1,3 +1,5 @@
+//! The steps of `tight` against finite differences, brute force and their guarantees.
+
 use medial::Vec3;
 use medial::complex::collapse::CollapseComplex;
 use medial::complex::{MedialMesh, Sphere, betti, crossing_faces};

@@ -1,4 +1,4 @@
-//! The steps one by one, against closed forms and brute force.
+//! The steps of VMAS one by one, against closed forms and brute force.
 
 use std::f64::consts::PI;
 
