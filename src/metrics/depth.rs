@@ -30,14 +30,14 @@ use crate::geometry::trees::{PointTree, in_morton_order};
 const MAX_EXITS: usize = 12;
 
 /// Limit of pieces in all searches for the largest depth. Then it is a lower bound only.
-const MAX_PIECES: usize = 1 << 22;
+const MAX_PIECES: usize = 1 << 19;
 
 /// Width of the interval around a depth, as a share of the extent of a piece of the surface, above which a search halves
 /// it.
 pub(super) const DOUBT: f64 = 0.25;
 
-/// Width of the interval around a depth searched for the largest, as a share of it.
-const SHARE: f64 = 1e-4;
+/// Widths of the intervals around depths searched for the largest, as shares of it: first of all, then of those that may be.
+const SHARES: [f64; 2] = [0.03, 1e-4];
 
 /// Bounds on the distance from a point to the boundary of a union.
 #[derive(Clone, Copy, Debug)]
@@ -245,21 +245,24 @@ impl<'a> Boundary<'a> {
     pub fn deepest_of(&self, mut peaks: Vec<Peak>) -> Option<Peak> {
         peaks.sort_by(|a, b| b.distance.total_cmp(&a.distance));
         let (mut best, mut near, mut left): (Option<Peak>, _, _) = (None, 0, MAX_PIECES);
-        for peak in peaks {
-            let most = best.map_or(f64::NEG_INFINITY, |best| best.distance);
-            if peak.distance <= most || left == 0 {
-                break;
-            }
-            let mut depth = self.of(peak.point, &mut near);
-            if !self.is_exact(&depth) && depth.upper > most {
-                // Samples may lie on the boundary by rounding only: their distance is no proof.
-                depth.upper = depth.upper.min(peak.distance * (1.0 + SHARE) + self.margin);
-                // Without a point outside, the bound is infinite.
-                let tolerance = SHARE * depth.upper.min(self.patches.diameter);
-                depth = self.within(peak.point, depth, tolerance, &mut left);
-            }
-            if depth.lower > most {
-                best = Some(Peak { point: peak.point, distance: depth.lower });
+        let mut depths = vec![None; peaks.len()];
+        for share in SHARES {
+            for (peak, known) in peaks.iter().zip(&mut depths) {
+                let most = best.map_or(f64::NEG_INFINITY, |best: Peak| best.distance);
+                if peak.distance <= most || left == 0 {
+                    break;
+                }
+                let depth = known.get_or_insert_with(|| self.of(peak.point, &mut near));
+                if !self.is_exact(depth) && depth.upper > most {
+                    // Samples may lie on the boundary by rounding only: their distance is no proof.
+                    depth.upper = depth.upper.min(peak.distance * (1.0 + SHARES[1]) + self.margin);
+                    // Without a point outside, the bound is infinite.
+                    let tolerance = share * depth.upper.min(self.patches.diameter);
+                    *depth = self.within(peak.point, *depth, tolerance, &mut left);
+                }
+                if depth.lower > most {
+                    best = Some(Peak { point: peak.point, distance: depth.lower });
+                }
             }
         }
         best
