@@ -90,7 +90,7 @@ pub fn record(
         record.reason = None;
     }
     fill_result(&mut record.simplify, result);
-    record.simplify.warnings.extend(scene.shape().sampling_warning());
+    record.simplify.warnings.extend(scene.shape().remarks());
     if let Some(ProgramPeak(bytes)) = result.extras.get() {
         // The program ran while this process held its input, so both peaks add up.
         record.simplify.peak_bytes = Some(run.times.peak_bytes + bytes);

@@ -85,7 +85,7 @@ impl Request<'_> {
         };
         fill_costs(&mut simplify, &run.times);
         fill_result(&mut simplify, &result);
-        simplify.warnings.extend(self.shape.sampling_warning());
+        simplify.warnings.extend(self.shape.remarks());
         (self.on_stage)("checking the topology");
         simplify.warnings.extend(topology_warnings(&result.mesh, self.shape));
         Ok(Output { simplify, result, search })

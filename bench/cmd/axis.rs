@@ -58,10 +58,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     }
     let [seconds, cpu_seconds] = stages.seconds();
     let expected = shape.expected_betti();
-    let changes = shape.report().repairs.iter().filter(|repair| repair.changes_geometry());
-    let mut warnings: Vec<String> = changes.map(|repair| format!("repaired: {repair}")).collect();
-    warnings.extend_from_slice(&shape.report().warnings);
-    warnings.extend(shape.sampling_warning());
+    let mut warnings = shape.report().warnings.clone();
+    warnings.extend(shape.remarks());
     warnings.extend(lost);
     if let Some(expected) = expected.filter(|&expected| expected != betti) {
         let advice = match shape.options().sampling {

@@ -76,7 +76,9 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
             "no output: write the result with -o {example}, or print its figures with --json"
         )));
     }
-    let repairs = input.report.repairs.iter().map(|repair| format!("repaired: {repair}"));
+    // The others are remarks of the result.
+    let repairs = input.report.repairs.iter().filter(|repair| !repair.changes_geometry());
+    let repairs = repairs.map(|repair| format!("repaired: {repair}"));
     let mut warnings: Vec<String> = repairs.chain(input.report.warnings.iter().cloned()).collect();
     if let Some(path) = &arguments.initial {
         let (initial, notes) = read_axis(path, &shape, arguments.fitting.into())?.0.with_remarks();

@@ -44,7 +44,7 @@ fn expected_umbrellas(delaunay: &Delaunay) -> Vec<Vec<[VertexId; 2]>> {
 
 #[test]
 fn umbrellas_are_the_triangles_whose_dual_edge_crosses_the_tangent_plane() {
-    let shape = test_shape("blob", 24);
+    let shape = test_shape("blob", 48);
     let delaunay = shape.delaunay().unwrap();
     let umbrellas = Umbrellas::new(&delaunay, shape.cells().unwrap().circumspheres());
     assert_eq!((umbrellas.missing(), umbrellas.flat()), (0, 0));

@@ -9,6 +9,7 @@ use medial::complex::{MedialMesh, Sphere};
 use medial::geometry::{Cone, Slab};
 use medial::shape::ShapeOptions;
 use medial::simplifier::RunContext;
+use medial::surface::Sampling;
 use proptest::prelude::*;
 
 use super::contract::{Contraction, Stop};
@@ -161,7 +162,9 @@ fn shape(id: &str, resolution: u32, noise: f64) -> Shape {
     let mesh = medial_datasets::find(id).unwrap().mesh(resolution);
     let mesh = medial_datasets::add_noise(&mesh, noise, 7);
     let report = medial::surface::validate(&mesh).unwrap();
-    Shape::new(id, &mesh, report, ShapeOptions::default()).unwrap()
+    // Few: the oracle is slow.
+    let options = ShapeOptions { sampling: Sampling::MeshVertices, ..ShapeOptions::default() };
+    Shape::new(id, &mesh, report, options).unwrap()
 }
 
 fn model_of(shape: &Shape) -> Model {

@@ -16,6 +16,7 @@
 //! Coincident circumcentres are not merged: merging by position can close loops, and the published
 //! counts are those without merging.
 
+use std::collections::{BTreeMap, VecDeque};
 use std::fmt;
 use std::sync::Arc;
 
@@ -62,6 +63,8 @@ pub struct CellSpheres {
     circumspheres: Vec<Option<Sphere>>,
     /// Spheres of the medial mesh that are no circumspheres, by cell, ascending.
     moved: Vec<(CellId, Sphere)>,
+    /// Whether the triangulation contains the surface, as far as no triangle is missing.
+    is_conforming: bool,
     /// For each finite cell.
     is_inside: Vec<bool>,
     /// The cells centred inside, along a Morton curve of their centres: neighbours are then close in
@@ -123,7 +126,8 @@ impl CellSpheres {
             (cell, Sphere::new(centre, surface.closest(centre).distance))
         });
         let moved = moved.collect();
-        Self::of_inside(delaunay, circumspheres, is_inside, moved)
+        let conforming = Self::of_inside(delaunay, circumspheres, is_inside, moved);
+        Self { is_conforming: true, ..conforming }
     }
 
     fn of_inside(
@@ -132,8 +136,14 @@ impl CellSpheres {
         is_inside: Vec<bool>,
         moved: Vec<(CellId, Sphere)>,
     ) -> Self {
-        let mut found =
-            Self { circumspheres, moved, is_inside, kept: Vec::new(), in_guard_band: 0 };
+        let mut found = Self {
+            circumspheres,
+            moved,
+            is_conforming: false,
+            is_inside,
+            kept: Vec::new(),
+            in_guard_band: 0,
+        };
         let cells = delaunay.finite_cells().filter(|&cell| found.is_inside(cell));
         let (cells, centres): (Vec<CellId>, Vec<Vec3>) =
             cells.filter_map(|cell| Some((cell, found.sphere(cell)?.centre))).unzip();
@@ -355,7 +365,50 @@ impl VoronoiFacets {
             all.start.extend(part.start[1..].iter().map(|s| s + offset));
             all.polygons.extend(part.polygons);
         }
+        if cells.is_conforming {
+            all.open_voids(delaunay, cells);
+        }
         all
+    }
+
+    /// Leaves out one facet of each sample that has no cell outside. Its Voronoi cell would be a void of the medial mesh. The
+    /// facets open these cells one after the other to that of a sample on the surface, so that no loop appears.
+    fn open_voids(&mut self, delaunay: &Delaunay, cells: &CellSpheres) {
+        let mut is_closed = vec![true; delaunay.point_count()];
+        for cell in delaunay.cells().filter(|&cell| !cells.is_inside(cell)) {
+            for v in delaunay.vertices(cell).into_iter().filter(|&v| v != VertexId::INFINITE) {
+                is_closed[v.index()] = false;
+            }
+        }
+        let mut of_closed: BTreeMap<VertexId, Vec<usize>> = BTreeMap::new();
+        for (facet, ends) in self.ends.iter().enumerate() {
+            for &end in ends.iter().filter(|end| is_closed[end.index()]) {
+                of_closed.entry(end).or_default().push(facet);
+            }
+        }
+        if of_closed.is_empty() {
+            return;
+        }
+        let is_at_surface = |&facet: &usize| self.ends[facet].iter().any(|v| !is_closed[v.index()]);
+        let next = of_closed.values().flatten().copied().filter(is_at_surface);
+        let mut next: VecDeque<usize> = next.collect();
+        let mut left_out = vec![false; self.ends.len()];
+        while let Some(facet) = next.pop_front() {
+            let closed = self.ends[facet].into_iter().find(|v| is_closed[v.index()]);
+            if let Some(closed) = closed {
+                is_closed[closed.index()] = false;
+                left_out[facet] = true;
+                next.extend(of_closed.get(&closed).into_iter().flatten());
+            }
+        }
+        let kept = (0..self.len()).filter(|&facet| !left_out[facet]);
+        let mut open = Self { start: vec![0], ..Self::default() };
+        for facet in kept {
+            open.ends.push(self.ends[facet]);
+            open.polygons.extend(self.polygon(facet));
+            open.start.push(open.polygons.len() as u32);
+        }
+        *self = open;
     }
 
     /// Adds the facet dual to edge `(i, j)` of `cell`, if `cell` is the smallest around it, so that

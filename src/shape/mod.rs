@@ -13,11 +13,12 @@ use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
 use crate::complex::{
-    CellSpheres, ComplexError, Conforming, ConformingError, DualTriangulation, MedialMesh,
+    CellSpheres, ComplexError, Conforming, ConformingError, DualTriangulation, MedialMesh, Sphere,
     VoronoiFacets, voronoi_medial_mesh,
 };
 use crate::diagnostics::Diagnostics;
@@ -111,8 +112,11 @@ impl Triangulated {
         least: usize,
     ) -> Result<Self, TriangulationError> {
         let begin = mesh.vertices.len().max(least);
+        // Any number where it is not known.
+        let [parts, _, cavities] = report.expected_betti.unwrap_or([usize::MAX - 1; 3]);
+        let parts = [parts, cavities];
         let found = match report.intersecting_pairs {
-            0 => Conforming::new(mesh, begin, (8 * begin).max(LEAST_BUDGET)),
+            0 => Conforming::new(mesh, begin, (8 * begin).max(LEAST_BUDGET), parts),
             // No refinement would end.
             _ => Err(ConformingError::Crossing),
         };
@@ -145,6 +149,12 @@ impl Triangulated {
 
 /// Points that may be added to a coarse surface; to others eight for each vertex.
 const LEAST_BUDGET: usize = 20_000;
+
+/// Reach of a start beyond the surface, as a fraction of the diagonal, that users are warned of.
+const FAR_START: f64 = 0.02;
+
+/// Number of spheres that share the deepest place found so far.
+const REACH_CHUNK: usize = 4_096;
 
 /// The part that does not depend on the samples.
 #[derive(Default)]
@@ -478,6 +488,38 @@ impl Shape {
             Triangulated { is_inside: Err(why), .. } => why.clone(),
             Triangulated { doubt, .. } => doubt.clone(),
         }
+    }
+
+    /// What a user has to know of the surface and the start of a result: changes to the surface,
+    /// [`Shape::sampling_warning`], and spheres that reach far beyond the surface. Of substrates that were not built nothing
+    /// is said. Cost: a bounded search in the tree of the surface for each sphere of the start.
+    pub fn remarks(&self) -> Vec<String> {
+        let changes = self.report().repairs.iter().filter(|repair| repair.changes_geometry());
+        let mut remarks: Vec<String> =
+            changes.map(|repair| format!("repaired: {repair}")).collect();
+        remarks.extend(self.sampling_warning());
+        let reach = self.reach().filter(|&reach| reach > FAR_START);
+        remarks.extend(reach.map(|reach| {
+            let percent = 100.0 * reach;
+            format!("spheres of the initial medial mesh reach {percent:.1} % of the diagonal beyond the surface")
+        }));
+        remarks
+    }
+
+    /// Largest distance by which a sphere of the conforming medial mesh reaches beyond the surface, as a fraction of the
+    /// diagonal; `None` before that is built.
+    pub fn reach(&self) -> Option<f64> {
+        let Sampling::Conforming { .. } = self.options().sampling else { return None };
+        let (start, _) = self.store.of_samples.medial.get()?;
+        let (start, tree) = (start.as_ref().ok()?, self.surface_tree().ok()?);
+        let deepest = |spheres: &[Sphere]| {
+            spheres.iter().fold(0.0, |reach: f64, sphere| {
+                let nearest = tree.closest_within_from(sphere.centre, sphere.radius - reach, None);
+                nearest.map_or(reach, |nearest| reach.max(sphere.radius - nearest.distance))
+            })
+        };
+        let parts = start.spheres.par_chunks(REACH_CHUNK).map(deepest);
+        Some(parts.reduce(|| 0.0, f64::max))
     }
 
     fn triangulated(&self) -> Result<Arc<Triangulated>, ShapeError> {

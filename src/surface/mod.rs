@@ -73,10 +73,23 @@ pub struct Inspection {
 }
 
 impl Inspection {
-    /// The surface, if it bounds a solid.
+    /// The surface as it is in the file, if it bounds a solid and needs no [`Inspection::resolved`].
     ///
     /// # Errors
-    /// [`Inspection::refused`].
+    /// [`Inspection::refused`], or [`Fault::Crossing`].
+    pub fn as_is(self) -> Result<Loaded, SurfaceError> {
+        let Self { mesh, report, refused, file, .. } = self;
+        match (refused, report.intersecting_pairs) {
+            (Some(error), _) => Err(error),
+            (None, 0) => Ok(Loaded { mesh, report }),
+            (None, pairs) => Err(SurfaceError { file, fault: Fault::Crossing { pairs } }),
+        }
+    }
+
+    /// The solid that the surface means: [`Inspection::resolved`], or else the surface, if it bounds one.
+    ///
+    /// # Errors
+    /// [`Inspection::refused`], if nothing was resolved.
     pub fn solid(self) -> Result<Loaded, SurfaceError> {
         match (self.resolved, self.refused) {
             (Some(solid), _) => Ok(*solid),

@@ -171,6 +171,9 @@ pub enum Fault {
         counted(*.faces, "face")
     )]
     ZeroVolume { face: usize, faces: usize },
+    /// Only from [`crate::surface::Inspection::as_is`]: faces that cross.
+    #[error("{}; without `--as-is` the solid that they mean is used", match pairs { 1 => "1 pair of faces crosses".to_owned(), _ => format!("{pairs} pairs of faces cross") })]
+    Crossing { pairs: usize },
     /// Too many components around one another to separate solid from cavity in time.
     #[error("{components} components lie too densely around one another to find their nesting")]
     TooManyNested { components: usize },

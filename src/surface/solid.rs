@@ -47,7 +47,7 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
         Some(_) => {
             let (built, weld) = closed(soup, unit, diagonal)?;
             repairs.extend(weld);
-            oriented(built)
+            oriented(built)?
         }
     };
     let replaced = mesh.faces.len();
@@ -118,12 +118,12 @@ fn closed(soup: &PolygonSoup, unit: Unit, diagonal: f64) -> Option<(Repaired, Op
     })
 }
 
-/// Faces oriented like their neighbours, and components that are within no other outward.
-fn oriented(built: Repaired) -> TriMesh {
+/// Faces oriented like their neighbours, and components that are within no other outward. None for one-sided surfaces, which
+/// have no winding number.
+fn oriented(built: Repaired) -> Option<TriMesh> {
     let Repaired { vertices, mut faces, topology, .. } = built;
-    if let Ok(turned) = topology.turns(&faces) {
-        turn_over(&mut faces, turned.into_iter());
-    }
+    let turned = topology.turns(&faces).ok()?;
+    turn_over(&mut faces, turned.into_iter());
     let components = topology.first_face.len();
     let mut volumes = vec![0.0; components];
     let mut boxes = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); components];
@@ -143,7 +143,7 @@ fn oriented(built: Repaired) -> TriMesh {
         .map(|c| volumes[c] < 0.0 && !(0..components).any(|outer| is_within(c, outer)))
         .collect();
     turn_over(&mut faces, topology.component.iter().map(|&c| is_wrong[c as usize]));
-    TriMesh { vertices, faces }
+    Some(TriMesh { vertices, faces })
 }
 
 /// The boundary of the region with a winding number of at least 1.

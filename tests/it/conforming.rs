@@ -298,10 +298,10 @@ fn a_surface_that_crosses_itself_keeps_its_vertices_with_a_warning() {
 #[test]
 fn a_coarse_surface_gets_the_samples_that_were_requested() {
     let cube = shapes::cuboid(Vec3::ZERO, Vec3::ONE);
-    let shape = shape_of(&cube, "conforming:500".parse().unwrap());
+    let shape = shape_of(&cube, "conforming:4000".parse().unwrap());
     assert_eq!(Some(betti(&shape.initial().unwrap())), shape.expected_betti());
     let samples = shape.samples();
-    assert!((500..600).contains(&samples.len()), "{}", samples.len());
+    assert!((4_000..4_400).contains(&samples.len()), "{}", samples.len());
     assert!(shape.surface_tree().unwrap().distance_batch(&samples).iter().all(|&d| d < 1e-12));
     // Evenly: none of the halves that are left is long.
     let spacing = |p: &Vec3| {

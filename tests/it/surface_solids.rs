@@ -57,10 +57,16 @@ fn shells_alternate_between_solid_and_cavity() {
 #[test]
 fn overlapping_parts_stay_outward_and_touching_cavities_inward() {
     let other = cuboid(Vec3::splat(0.5), Vec3::splat(3.0));
-    let overlapping = read(&joined(&[shell(1.0), inverted(other)]));
+    let off = to_off(&joined(&[shell(1.0), inverted(other)]));
+    let overlapping = surface::inspect_bytes("test.off", off.as_bytes()).expect("read");
     assert_eq!(overlapping.report.repairs, [Repair::TurnedOutward { components: 1 }]);
     assert_eq!(overlapping.report.expected_betti, Some([2, 0, 0]));
     assert!(overlapping.report.self_intersecting && overlapping.report.warnings.len() == 2);
+    // Together they are one solid.
+    let solid = overlapping.solid().expect("one solid").report;
+    assert_eq!((solid.expected_betti, solid.self_intersecting), (Some([1, 0, 0]), false));
+    assert!((solid.volume.expect("closed") - (8.0 + 2.5_f64.powi(3) - 0.125)).abs() < 1e-12);
+    assert!(matches!(solid.repairs[..], [_, Repair::ResolvedFaces { faces: 24, .. }]));
 
     // An octahedron that touches the wall of the box from within, in the middle of faces.
     let octahedron = sphere(0);
@@ -291,17 +297,14 @@ fn holes_that_meet_are_refused() {
 }
 
 #[test]
-fn parts_that_touch_in_a_vertex_are_drawn_apart_on_demand() {
+fn parts_that_touch_in_a_vertex_are_drawn_apart() {
     let mut both = lattice_box(1, |_| false);
     let shift = both.vertices.len() as u32;
     both.vertices.extend_from_within(..);
     both.vertices[shift as usize..].iter_mut().for_each(|v| *v += Vec3::ONE);
     both.faces.extend_from_within(..);
     both.faces[12..].iter_mut().for_each(|face| *face = face.map(|v| v + shift));
-    let fault = mend(&both, FILL).expect_err("they touch").fault;
-    assert!(matches!(fault, Fault::NonManifoldVertex { vertices: 1, .. }), "{fault}");
-    let options = MendOptions { separate: true, ..MendOptions::default() };
-    let mended = mend(&both, options).expect("two solids");
+    let mended = mend(&both, MendOptions::default()).expect("two solids");
     assert_eq!(mended.report.expected_betti, Some([2, 0, 0]));
     assert!((mended.report.volume.expect("closed") - 2.0).abs() < 2e-3);
     let moved = mended.mesh.vertices.iter().filter(|v| !both.vertices.contains(v)).count();

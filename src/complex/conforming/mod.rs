@@ -46,7 +46,7 @@ mod refine;
 mod skin;
 mod stars;
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 use skin::Skin;
 use stars::Stars;
@@ -54,7 +54,7 @@ use stars::Stars;
 use crate::Vec3;
 use crate::geometry::triangulation::Facet;
 use crate::geometry::{CellId, Delaunay, DisjointSets, TriangulationError};
-use crate::surface::{InsideTest, Side, TriMesh, TriangleBvh};
+use crate::surface::{InsideTest, Normalisation, Side, TriMesh, TriangleBvh};
 
 /// Limit of rounds of refinement.
 const ROUNDS: usize = 1_000;
@@ -62,18 +62,32 @@ const ROUNDS: usize = 1_000;
 /// Patches are given up after this many times the points with which the fewest triangles were missing.
 const GROWTH: usize = 2;
 
-/// Points in addition to these.
-const SLACK: usize = 20_000;
-
 /// Limit of rounds against balls that reach far beyond the surface. Few shapes need ten.
 const APPROACHES: usize = 40;
 
-/// Limit of times that patches are given up.
-const GIVE_UPS: usize = 4;
+/// How a surface is refined.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    /// Largest distance of neighbouring triangles from one plane in a patch, as a fraction of the surface's diagonal.
+    flat: f64,
+    /// Whether edges between patches are flipped.
+    bends: bool,
+    /// Number of points, in addition to [`GROWTH`] times those with which the fewest triangles were missing, after which
+    /// patches are given up.
+    slack: usize,
+    /// Limit of times that patches are given up.
+    give_ups: usize,
+    /// Limit of rounds after that with the fewest missing triangles.
+    rounds: usize,
+}
 
-/// Largest distance of neighbouring triangles from one plane in a patch, as a fraction of the surface's diagonal: first for
-/// files of six digits, then for surfaces with details of that size.
-const FLAT: [f64; 2] = [1e-6, 1e-10];
+/// Ways that are tried in turn: the first for coarse surfaces alone, the last for surfaces with details below the rounding of
+/// files of six digits.
+const WAYS: [Way; 3] = [
+    Way { flat: 1e-6, bends: false, slack: 20_000, give_ups: 0, rounds: 100 },
+    Way { flat: 1e-6, bends: true, slack: 20_000, give_ups: 4, rounds: ROUNDS },
+    Way { flat: 1e-10, bends: false, slack: 20_000, give_ups: 4, rounds: ROUNDS },
+];
 
 /// Length of an edge, as a fraction of the surface's diagonal, above which a surface is coarse.
 const COARSE: f64 = 0.1;
@@ -83,9 +97,6 @@ const FAR: f64 = 0.02;
 
 /// Depth that is reached then, and on coarse surfaces.
 const CLOSE: f64 = 0.01;
-
-/// Largest volume of a part or cavity that is none, as a share of the solid's volume.
-const SPECK: f64 = 1e-6;
 
 /// Largest volume of a flat cell, six times, as a share of the cube of its longest edge.
 const FLAT_CELL: f64 = 1e-3;
@@ -126,7 +137,7 @@ pub enum ConformingError {
 impl Conforming {
     /// Halves the longest edges of a closed, oriented surface until it has `least` points. Then refines it until the
     /// Delaunay triangulation contains it, and until the balls of its cells end near the surface; no round of that
-    /// begins after `most` points were added. The same result for any number of threads. Cost: `O(n log n)` expected,
+    /// begins after `most` points were added. `parts` are the numbers of parts and cavities of the solid. The same result for any number of threads. Cost: `O(n log n)` expected,
     /// and `O(n)` for each round.
     ///
     /// # Errors
@@ -135,26 +146,62 @@ impl Conforming {
     ///
     /// # Panics
     /// If a face names a vertex that does not exist.
-    pub fn new(surface: &TriMesh, least: usize, most: usize) -> Result<Self, ConformingError> {
+    pub fn new(
+        surface: &TriMesh,
+        least: usize,
+        most: usize,
+        parts: [usize; 2],
+    ) -> Result<Self, ConformingError> {
         let delaunay = Delaunay::new(&surface.vertices)?;
-        for is_strict in [false, true] {
+        let mut kept: Option<Refinement> = None;
+        let mut failure = ConformingError::Crossing;
+        let is_coarse = is_coarse(surface);
+        for (step, way) in WAYS.into_iter().enumerate() {
+            // Dense surfaces begin with flips.
+            if step == 0 && !is_coarse {
+                continue;
+            }
             let mut refinement =
-                Refinement::new(surface, delaunay.clone(), [least, most], is_strict)?;
+                Refinement::new(surface, delaunay.clone(), [least, most], parts, way)?;
             let missing = refinement.skin.missing(&refinement.delaunay);
-            match refinement.conform(missing) {
+            match refinement.conform(missing, None) {
+                Ok(()) => {
+                    let missing = refinement.missing.len();
+                    if kept.as_ref().is_none_or(|kept| missing < kept.missing.len()) {
+                        kept = Some(refinement);
+                    }
+                    if step > 0 || missing == 0 {
+                        break;
+                    }
+                }
                 // Flips can make close sheets cross.
-                Err(ConformingError::Crossing) => continue,
-                conforming => conforming?,
+                Err(ConformingError::Crossing) => {}
+                Err(why) if step > 0 => {
+                    failure = why;
+                    break;
+                }
+                Err(why) => failure = why,
             }
-            if (refinement.skin.is_coarse(COARSE) || refinement.has_protrusions(FAR))
-                && let Ok(tree) = TriangleBvh::new(surface)
-            {
-                refinement.approach(&tree);
-            }
-            return Ok(refinement.finish());
         }
-        Err(ConformingError::Crossing)
+        let mut refinement = kept.ok_or(failure)?;
+        if (is_coarse || refinement.has_protrusions(FAR))
+            && let Ok(tree) = TriangleBvh::new(surface)
+        {
+            refinement.approach(&tree, false);
+            if is_coarse {
+                refinement.approach(&tree, true);
+            }
+        }
+        Ok(refinement.finish())
     }
+}
+
+/// Whether the surface has an edge longer than [`COARSE`].
+fn is_coarse(surface: &TriMesh) -> bool {
+    let Some(units) = Normalisation::of(surface) else { return false };
+    let limit = COARSE * units.diagonal;
+    let triangles = (0..surface.faces.len()).map(|f| surface.triangle(f));
+    triangles.into_iter().any(|[a, b, c]| [a - b, b - c, c - a].iter().any(|e| e.length() > limit))
 }
 
 /// A surface and the triangulation of its points.
@@ -166,8 +213,7 @@ struct Refinement {
     delaunay: Delaunay,
     /// For each finite cell whether it is in the solid, once the triangulation contains the surface.
     is_inside: Vec<bool>,
-    /// Whether edges between patches stay.
-    is_strict: bool,
+    way: Way,
     /// Patches whose missing triangles stay missing. Looked up, never iterated.
     given_up: HashSet<u32>,
     /// Number of times that patches were given up.
@@ -178,6 +224,8 @@ struct Refinement {
     begin: usize,
     /// Limit of points that are added in rounds.
     most: usize,
+    /// Numbers of parts and cavities of the solid.
+    parts: [usize; 2],
     rounds: usize,
 }
 
@@ -193,9 +241,10 @@ impl Refinement {
         surface: &TriMesh,
         mut delaunay: Delaunay,
         [least, most]: [usize; 2],
-        is_strict: bool,
+        parts: [usize; 2],
+        way: Way,
     ) -> Result<Self, ConformingError> {
-        let mut skin = Skin::new(surface, &delaunay, FLAT[usize::from(is_strict)])?;
+        let mut skin = Skin::new(surface, &delaunay, way.flat)?;
         skin.flip_by_angles(0..skin.triangles.len());
         skin.split_longest(least);
         let begin = skin.points.len();
@@ -205,12 +254,13 @@ impl Refinement {
             skin,
             delaunay,
             is_inside: Vec::new(),
-            is_strict,
+            way,
             given_up: HashSet::new(),
             give_ups: 0,
             missing: Vec::new(),
             begin,
             most,
+            parts,
             rounds: 0,
         })
     }
@@ -221,35 +271,63 @@ impl Refinement {
         Conforming { delaunay, is_inside, added, rounds, missing: missing.len() }
     }
 
-    /// Step 6: adds points until all balls end near the surface, or the limit is reached. A round that gives up patches is
-    /// undone.
-    fn approach(&mut self, surface: &TriangleBvh) {
+    /// Step 6: adds points until all balls end near the surface and, if it `keeps_gaps`, close none, or the limit is reached. A
+    /// round that gives up patches is
+    /// undone, and no point is added again near those of its points that are next to a triangle that stayed missing: at
+    /// twice the distance each time.
+    fn approach(&mut self, surface: &TriangleBvh, keeps_gaps: bool) {
+        let closest = CLOSE * self.skin.diagonal;
+        let mut closed: Vec<(Vec3, f64)> = Vec::new();
+        let mut distance = closest;
         for _ in 0..APPROACHES {
-            let mut next = self.clone();
-            next.split_protrusions(CLOSE, surface);
+            let give_ups = self.give_ups + 1;
+            let way = Way { bends: false, slack: 0, give_ups, rounds: ROUNDS, ..self.way };
+            let mut next = Self { way, ..self.clone() };
+            next.split_protrusions(CLOSE, surface, &closed, keeps_gaps);
             let (before, after) = (self.skin.points.len(), next.skin.points.len());
             if before == after || after - self.begin >= self.most {
                 return;
             }
             let missing = std::mem::take(&mut next.missing);
-            let conforms = next.insert(before, missing).and_then(|missing| next.conform(missing));
-            if conforms.is_err() || next.give_ups > self.give_ups {
+            let conforms = next.insert(before, missing);
+            let conforms = conforms.and_then(|missing| next.conform(missing, Some(surface)));
+            if conforms.is_ok() && next.give_ups == self.give_ups {
+                *self = next;
+                distance = closest;
+                continue;
+            }
+            let new = &next.skin.points[before..after];
+            let known = closed.len();
+            closed.extend(next.missing.iter().filter_map(|&t| {
+                let at = next.skin.corners(t).into_iter().sum::<Vec3>() / 3.0;
+                let nearest = new
+                    .iter()
+                    .min_by(|p, q| p.distance_squared(at).total_cmp(&q.distance_squared(at)));
+                Some((*nearest?, distance))
+            }));
+            if closed.len() == known {
                 return;
             }
-            *self = next;
+            distance *= 2.0;
         }
     }
 
-    /// Steps 1 to 5: adds points until no triangle is missing, except in patches that are given up.
-    fn conform(&mut self, mut missing: Vec<u32>) -> Result<(), ConformingError> {
+    /// Steps 1 to 5: adds points until no triangle is missing, except in patches that are given up. They are moved from
+    /// flipped triangles to `surface`, where it is given.
+    fn conform(
+        &mut self,
+        mut missing: Vec<u32>,
+        surface: Option<&TriangleBvh>,
+    ) -> Result<(), ConformingError> {
         // The state with the fewest missing triangles.
         let mut best: Option<Box<Snapshot>> = None;
-        let (mut least, mut limit) = (usize::MAX, 0);
+        let (mut least, mut limit, mut since) = (usize::MAX, 0, self.rounds);
+        let Way { bends, slack, give_ups, rounds, .. } = self.way;
         loop {
             let mut stars = Stars::of(&self.delaunay);
             let skin = &mut self.skin;
             skin.flip_to(&missing, &mut stars);
-            if !self.is_strict {
+            if bends {
                 skin.flip_bent(&missing, &mut stars);
             }
             let suspects = skin.with_changed(missing);
@@ -261,26 +339,31 @@ impl Refinement {
                     0 => skin.label(&self.delaunay)?,
                     _ => self.winding(),
                 };
+                join_specks(&self.delaunay, &mut self.is_inside, self.parts);
                 self.missing = missing;
                 return Ok(());
             }
             if open.len() < least {
-                (least, limit) = (open.len(), GROWTH * skin.points.len() + SLACK);
+                (least, limit) = (open.len(), GROWTH * skin.points.len() + slack);
+                since = self.rounds;
                 let (skin, delaunay) = (skin.clone(), self.delaunay.clone());
                 best = Some(Box::new(Snapshot { skin, delaunay, missing: missing.clone() }));
             }
             let before = skin.points.len();
             let (added, most) = (before - self.begin, self.most);
-            if added < most && before < limit && self.rounds < ROUNDS {
+            if added < most && before < limit && self.rounds - since < rounds {
                 skin.refine(&open, &mut stars);
             }
             if skin.points.len() > before {
+                if let Some(surface) = surface {
+                    skin.move_to(surface, before);
+                }
                 missing = self.insert(before, missing)?;
                 self.rounds += 1;
                 continue;
             }
             let error = ConformingError::Budget { missing: least, added, most };
-            let snapshot = best.take().filter(|_| self.give_ups < GIVE_UPS).ok_or(error)?;
+            let snapshot = best.take().filter(|_| self.give_ups < give_ups).ok_or(error)?;
             (self.skin, self.delaunay, missing) =
                 (snapshot.skin, snapshot.delaunay, snapshot.missing);
             self.give_ups += 1;
@@ -290,44 +373,16 @@ impl Refinement {
         }
     }
 
-    /// For each finite cell whether the winding number of the skin is positive at its centroid. Parts and cavities of
-    /// little volume, which missing triangles leave, join their surroundings.
+    /// For each finite cell whether the winding number of the skin is positive at its centroid.
     fn winding(&self) -> Vec<bool> {
         let delaunay = &self.delaunay;
         let corners = |cell: CellId| delaunay.vertices(cell).map(|v| delaunay.point(v));
         let centroid = |cell: CellId| corners(cell).into_iter().sum::<Vec3>() / 4.0;
-        let volume = |cell: CellId| {
-            let [a, b, c, d] = corners(cell);
-            (b - a).cross(c - a).dot(d - a).abs() / 6.0
-        };
-        let cells: Vec<CellId> = delaunay.finite_cells().collect();
-        let centroids: Vec<Vec3> = cells.iter().map(|&cell| centroid(cell)).collect();
+        let centroids: Vec<Vec3> = delaunay.finite_cells().map(centroid).collect();
         let Skin { points, triangles, .. } = &self.skin;
         let skin = TriMesh { vertices: points.clone(), faces: triangles.clone() };
         let sides = InsideTest::new(&skin).sides(&centroids);
-        let mut is_inside: Vec<bool> = sides.iter().map(|&side| side == Side::Inside).collect();
-        let inside = |cell: CellId| is_inside.get(cell.index()).is_some_and(|&inside| inside);
-        let mut parts = DisjointSets::singletons(delaunay.cell_count());
-        for &cell in &cells {
-            for other in delaunay.neighbours(cell) {
-                if inside(cell) == inside(other) {
-                    parts.join(cell.0, other.0);
-                }
-            }
-        }
-        let mut volumes = vec![0.0; delaunay.cell_count()];
-        let total: f64 = cells.iter().filter(|&&cell| inside(cell)).map(|&cell| volume(cell)).sum();
-        for &cell in &cells {
-            volumes[parts.find(cell.0) as usize] += volume(cell);
-        }
-        for cell in delaunay.infinite_cells() {
-            volumes[parts.find(cell.0) as usize] = f64::INFINITY;
-        }
-        for &cell in &cells {
-            let is_speck = volumes[parts.find(cell.0) as usize] < SPECK * total;
-            is_inside[cell.index()] ^= is_speck;
-        }
-        is_inside
+        sides.iter().map(|&side| side == Side::Inside).collect()
     }
 
     /// Inserts the points from `first` on. Returns the missing triangles, given those before.
@@ -336,6 +391,42 @@ impl Refinement {
         let mut suspects = self.skin.with_changed(missing);
         suspects.extend(self.skin.near_new(first, &self.delaunay));
         Ok(self.skin.missing_among(suspects, &self.delaunay))
+    }
+}
+
+/// Joins the parts and cavities beyond the numbers of the solid with their surroundings, those of least volume: missing
+/// triangles and degenerate places leave such.
+fn join_specks(delaunay: &Delaunay, is_inside: &mut [bool], [parts, cavities]: [usize; 2]) {
+    let inside = |cell: CellId| is_inside.get(cell.index()).is_some_and(|&inside| inside);
+    let mut sets = DisjointSets::singletons(delaunay.cell_count());
+    for cell in delaunay.cells() {
+        for other in delaunay.neighbours(cell) {
+            if inside(cell) == inside(other) {
+                sets.join(cell.0, other.0);
+            }
+        }
+    }
+    let mut volumes: BTreeMap<u32, f64> = BTreeMap::new();
+    for cell in delaunay.cells() {
+        let volume = match delaunay.is_infinite(cell) {
+            true => f64::INFINITY,
+            false => {
+                let [a, b, c, d] = delaunay.vertices(cell).map(|v| delaunay.point(v));
+                (b - a).cross(c - a).dot(d - a).abs()
+            }
+        };
+        *volumes.entry(sets.find(cell.0)).or_default() += volume;
+    }
+    let mut specks = HashSet::new();
+    // With the outside itself.
+    for (is_part, number) in [(true, parts), (false, cavities + 1)] {
+        let regions = volumes.iter().filter(|&(&cell, _)| inside(CellId(cell)) == is_part);
+        let mut regions: Vec<(f64, u32)> = regions.map(|(&cell, &volume)| (volume, cell)).collect();
+        regions.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        specks.extend(regions.iter().skip(number).map(|&(_, cell)| cell));
+    }
+    for cell in delaunay.finite_cells() {
+        is_inside[cell.index()] ^= specks.contains(&sets.find(cell.0));
     }
 }
 

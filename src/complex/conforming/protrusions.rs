@@ -14,6 +14,12 @@ const SNAP: f64 = 0.25;
 /// Distance from the surface, as a fraction of its diagonal, that is rounding.
 const ROUNDING: f64 = 1e-12;
 
+/// Depth of a ball, as a share of the tolerated one, from which it must not close a gap.
+const LEAST: f64 = 0.01;
+
+/// Distance that stays free in front of the deepest point of a ball, in depths.
+const FREE: f64 = 1.5;
+
 /// A ball that is too large for its place.
 struct Protrusion {
     /// Radius less the distance from the centre to the surface.
@@ -33,25 +39,44 @@ impl Refinement {
 
     /// Adds points until every such ball contains one of them. Each is at least as far from all vertices as three quarters
     /// of the depth, so that the area of the surface bounds their number.
-    /// The points are moved from flipped triangles to the surface itself.
-    pub fn split_protrusions(&mut self, depth: f64, surface: &TriangleBvh) {
+    /// None is near to a place of `closed`, a point with a distance. The points are moved from flipped triangles to the surface
+    /// itself.
+    pub fn split_protrusions(
+        &mut self,
+        depth: f64,
+        surface: &TriangleBvh,
+        closed: &[(Vec3, f64)],
+        keeps_gaps: bool,
+    ) {
+        let first = self.skin.points.len();
         let depth = depth * self.skin.diagonal;
-        let mut protrusions = self.protrusions(depth);
+        let mut protrusions = self.protrusions(if keeps_gaps { LEAST * depth } else { depth });
+        protrusions.retain(|ball| ball.depth > depth || self.closes_gap(ball, surface));
         // The deepest first.
         protrusions.sort_by(|a, b| b.depth.total_cmp(&a.depth));
         let mut fresh = PointGrid::new(depth);
-        for Protrusion { centre, radius, foot, triangle, .. } in protrusions {
-            if !fresh.any_within(centre, radius)
-                && let Some(at) = self.skin.split_at(triangle, foot, SNAP * depth)
+        for Protrusion { depth: ball, centre, radius, foot, triangle } in protrusions {
+            if !closed.iter().any(|(at, radius)| at.distance(foot) < *radius)
+                && !fresh.any_within(centre, radius)
+                && let Some(at) = self.skin.split_at(triangle, foot, SNAP * ball.min(depth))
             {
-                let on_surface = surface.closest(at);
-                let moved = on_surface.distance > ROUNDING * self.skin.diagonal;
-                if let Some(last) = self.skin.points.last_mut().filter(|_| moved) {
-                    *last = on_surface.point;
-                }
                 fresh.insert(at);
             }
         }
+        self.skin.move_to(surface, first);
+    }
+
+    /// Whether a ball reaches over a third of the way to another part of the surface: together with that of the other side it
+    /// would close the gap, however deep that is.
+    fn closes_gap(&self, ball: &Protrusion, surface: &TriangleBvh) -> bool {
+        let [a, b, c] = self.skin.corners(ball.triangle);
+        let outward = (b - a).cross(c - a).normalize_or_zero();
+        let way = FREE * ball.depth;
+        let tip = ball.foot + way * outward;
+        let nearest = surface.closest(tip);
+        // Behind an edge of the surface, beside the tip, the balls of both sides leave the edge as it is.
+        nearest.distance < 0.9 * way
+            && outward.dot(nearest.point - tip).abs() > 0.5 * nearest.distance
     }
 
     fn protrusions(&self, depth: f64) -> Vec<Protrusion> {
@@ -86,6 +111,16 @@ impl Refinement {
 }
 
 impl Skin {
+    /// Moves the points from `first` on to the surface, where flips have left it.
+    pub fn move_to(&mut self, surface: &TriangleBvh, first: usize) {
+        for point in &mut self.points[first..] {
+            let nearest = surface.closest(*point);
+            if nearest.distance > ROUNDING * self.diagonal {
+                *point = nearest.point;
+            }
+        }
+    }
+
     /// Adds a point of a triangle that other points of this round may have split. None where the way to it leaves the patch.
     fn split_at(&mut self, triangle: u32, p: Vec3, snap: f64) -> Option<Vec3> {
         let place = self.locate(triangle, p);
@@ -97,12 +132,15 @@ impl Skin {
         };
         let Some(edge) = edge else {
             let Place::Triangle(t) = place else { return None };
-            self.split_triangle(t, p);
-            return Some(p);
+            // The ball of a flat cell is only as exact as its circumcentre.
+            return self.takes(t, p, snap).then(|| {
+                self.split_triangle(t, p);
+                p
+            });
         };
-        let is_segment = self.is_segment(self.across[&key(edge)], edge);
-        let at = if is_segment { self.nearest_on(edge, p) } else { p };
-        if at.distance(p) > snap {
+        let t = self.across[&key(edge)];
+        let at = if self.is_segment(t, edge) { self.nearest_on(edge, p) } else { p };
+        if at.distance(p) > snap || !self.takes(t, at, snap) {
             return None;
         }
         self.split_edge(edge, at);

@@ -55,22 +55,22 @@ impl Skin {
                 fresh.insert(at);
             }
         }
+        let apart = RESOLUTION * self.diagonal;
         // The largest first: the points of a patch are as far from each other as they can be.
         let mut whole: Vec<(f64, u32)> = (whole.into_iter())
             .filter(|&t| !busy.contains(&self.patch[t as usize]))
             .map(|t| (circumcircle(self.corners(t)).1, t))
             .collect();
         whole.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let mut new: HashMap<u32, Vec<Vec3>> = HashMap::new();
+        let typical = whole.get(whole.len() / 2).map_or(1.0, |&(radius, _)| radius.max(apart));
+        let mut new: HashMap<u32, PointGrid> = HashMap::new();
         let mut cut: HashSet<[u32; 2]> = HashSet::new();
         for (_, t) in whole {
             let (centre, radius) = circumcircle(self.corners(t));
             let patch = self.patch[t as usize];
-            let points = new.entry(patch).or_default();
+            let points = new.entry(patch).or_insert_with(|| PointGrid::new(typical));
             // A point of this round may have made the triangle another one.
-            if points.iter().any(|p| p.distance(centre) < radius)
-                || radius < RESOLUTION * self.diagonal
-            {
+            if points.any_within(centre, radius) || radius < apart {
                 continue;
             }
             let at = match self.locate(t, centre) {
@@ -82,24 +82,26 @@ impl Skin {
                     self.split_edge(edge, at);
                     at
                 }
-                Place::Edge(edge) => {
-                    // A walk among needles can end at a vertex.
-                    let is_end = |v: u32| {
-                        self.points[v as usize].distance(centre) < RESOLUTION * self.diagonal
-                    };
-                    if edge.into_iter().any(is_end) {
-                        continue;
-                    }
+                Place::Edge(edge) if self.takes(self.across[&key(edge)], centre, apart) => {
                     self.split_edge(edge, centre);
                     centre
                 }
-                Place::Triangle(t) => {
+                Place::Triangle(t) if self.takes(t, centre, apart) => {
                     self.split_triangle(t, centre);
                     centre
                 }
+                _ => continue,
             };
-            new.entry(patch).or_default().push(at);
+            points.insert(at);
         }
+    }
+
+    /// Whether a point may split a triangle or one of its sides: at a distance from its corners, and no farther from them than
+    /// they are from each other. A walk among needles can end elsewhere.
+    pub(super) fn takes(&self, t: u32, at: Vec3, apart: f64) -> bool {
+        let [a, b, c] = self.corners(t);
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        [a, b, c].iter().all(|p| (apart..=longest).contains(&p.distance(at)))
     }
 
     /// Where a segment is split: as far from one end as the vertex that encroaches upon it most, if that is

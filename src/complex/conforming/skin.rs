@@ -79,12 +79,6 @@ impl Skin {
     }
 
     /// Whether an edge is longer than a fraction of the diagonal.
-    pub fn is_coarse(&self, length: f64) -> bool {
-        let edges = self.triangles.iter().flat_map(|&t| sides(t));
-        let ends = edges.map(|edge| edge.map(|v| self.points[v as usize]));
-        ends.into_iter().any(|[a, b]| a.distance(b) > length * self.diagonal)
-    }
-
     pub fn opposite(&self, t: u32, [a, b]: [u32; 2]) -> u32 {
         let corners = self.triangles[t as usize];
         corners.into_iter().find(|&v| v != a && v != b).expect("three corners")
