@@ -1,5 +1,7 @@
 //! Closest point on a triangle mesh.
 
+use std::ops::ControlFlow;
+
 use crate::Vec3;
 use crate::geometry::planar_frame::{Part, PlanarFrame};
 use crate::geometry::trees::{Bounds, Frame, Lanes, Plan, Query, Tree, WideTree, in_morton_order};
@@ -213,6 +215,28 @@ impl TriangleBvh {
             // Once one is found, no box is near enough.
             if found { -1.0 } else { limit }
         });
+        found
+    }
+
+    /// The distance from one face.
+    pub(super) fn distance_from_face(&self, p: Vec3, face: u32) -> f64 {
+        self.frames[self.places[face as usize] as usize].distance_squared(p).sqrt()
+    }
+
+    /// Whether a face passes `test`, among those in boxes that pass `enter`.
+    pub(super) fn any(
+        &self,
+        enter: impl Fn(&Bounds) -> bool,
+        test: impl Fn([Vec3; 3]) -> bool,
+    ) -> bool {
+        let mut found = false;
+        self.tree.descend(
+            |_, node| enter(&node.bounds),
+            |mut places| {
+                found = places.any(|place| test(self.corners[place]));
+                if found { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            },
+        );
         found
     }
 

@@ -51,14 +51,19 @@ impl fmt::Display for Format {
     }
 }
 
-/// Parses the content of a file.
-pub(super) fn parse(bytes: &[u8], format: Format) -> Result<PolygonSoup, Fault> {
-    let soup = match format {
+/// Parses the content of a file that may have no face.
+pub(super) fn parse_points(bytes: &[u8], format: Format) -> Result<PolygonSoup, Fault> {
+    match format {
         Format::Off => off::parse(bytes),
         Format::Obj => obj::parse(bytes),
         Format::Ply => ply::parse(bytes),
         Format::Stl => stl::parse(bytes),
-    }?;
+    }
+}
+
+/// Parses the content of a file.
+pub(super) fn parse(bytes: &[u8], format: Format) -> Result<PolygonSoup, Fault> {
+    let soup = parse_points(bytes, format)?;
     match soup.len() {
         0 => Err(Fault::NoFaces { vertices: soup.vertices.len() }),
         _ => Ok(soup),
@@ -301,7 +306,8 @@ vertex 3 => vertex 99 => the header announces 99 vertices, but the file holds on
             let [from, to, expected] = case.splitn(3, " => ").collect::<Vec<_>>()[..] else {
                 panic!("{case}");
             };
-            let error = ply::parse(PLY.replacen(from, to, 1).as_bytes()).unwrap_err().to_string();
+            let text = PLY.replacen(from, to, 1);
+            let error = parse(text.as_bytes(), Format::Ply).unwrap_err().to_string();
             assert!(error.starts_with(expected), "{from} to {to}: {error}");
         }
     }

@@ -108,7 +108,12 @@ impl Unit {
         }))
     }
 
-    /// The same for many points.
+    /// From scaled coordinates to the unit of the file.
+    pub(super) fn restore(self, p: Vec3) -> Vec3 {
+        Vec3::from(p.to_array().map(|x| times_power(x, self.exponent)))
+    }
+
+    /// [`Self::forward`] for many points.
     pub(super) fn forward_all(self, points: &[Vec3]) -> Vec<Vec3> {
         points.iter().map(|&p| self.forward(p)).collect()
     }

@@ -21,6 +21,7 @@ mod mesh;
 mod obj;
 mod off;
 pub(crate) mod ply;
+mod point_grid;
 mod repair;
 mod report;
 mod sample;
@@ -30,6 +31,7 @@ mod soup;
 mod stl;
 mod text;
 mod topology;
+mod wrap;
 
 use std::path::{Path, PathBuf};
 
@@ -44,9 +46,11 @@ pub use mend::{Components, MendOptions};
 #[cfg(test)]
 pub(crate) use mesh::fixtures;
 pub use mesh::{Normalisation, TriMesh, write};
+pub(crate) use point_grid::PointGrid;
 pub use report::{Fault, Place, Repair, SurfaceError, SurfaceReport, VertexName};
 pub use sample::{ParseSamplingError, Sampling, sample, sample_with_faces};
 pub use shrinking_ball::{Ball, End, Touched, shrinking_ball};
+pub use wrap::{PRECISION as WRAP_PRECISION, WrapError, WrapOptions, inspect_wrapped, wrap};
 
 /// A surface that bounds a solid: closed, manifold, oriented outward, with positive volume.
 #[derive(Clone, Debug, PartialEq)]

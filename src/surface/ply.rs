@@ -263,10 +263,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
     if ["x", "y", "z"].iter().any(|axis| !file.has("vertex", &[axis])) {
         return Err(missing_in(&file, "element vertex with x, y and z before it"));
     }
-    if !file.elements.iter().any(|element| element.name == "face") {
-        return Err(Fault::NoFaces { vertices });
-    }
-    if !file.has("face", &["vertex_indices", "vertex_index"]) {
+    let has_faces = file.elements.iter().any(|element| element.name == "face");
+    if has_faces && !file.has("face", &["vertex_indices", "vertex_index"]) {
         return Err(missing_in(&file, "a list vertex_indices in element face before it"));
     }
     let mut soup = PolygonSoup::default();

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use super::wrap::WrapError;
 use crate::Vec3;
 
 /// A surface that could not be read or may not be used, and why.
@@ -177,6 +178,15 @@ pub enum Fault {
     /// Too many components around one another to separate solid from cavity in time.
     #[error("{components} components lie too densely around one another to find their nesting")]
     TooManyNested { components: usize },
+    /// Only from [`crate::surface::inspect_wrapped`]: there is no wrap.
+    #[error(transparent)]
+    Wrap(#[from] WrapError),
+    /// Only from [`crate::surface::inspect_wrapped`]: rounding makes faces of the wrap cross.
+    #[error("faces of the wrap cross; use a larger alpha")]
+    WrapCrosses,
+    /// Only from [`crate::surface::inspect_wrapped`]: rounding leaves a part of the input outside.
+    #[error("triangle {triangle} is not inside of the wrap; use a larger offset")]
+    WrapMisses { triangle: usize },
     /// Only from [`crate::surface::validate`]: a face that names a vertex twice.
     #[error("face {face} names a vertex twice")]
     RepeatedCorner { face: usize },
@@ -280,6 +290,19 @@ pub enum Repair {
     ResolvedFaces { faces: usize, by: usize },
     /// A hole was closed by triangles between its vertices, on demand.
     FilledHole { edges: usize, triangles: usize },
+    /// The surface was replaced by one around it, on demand.
+    Wrapped {
+        /// Number of triangles in the wrap. Points count apart.
+        triangles: usize,
+        /// Number of points of a file without faces.
+        points: usize,
+        /// Radius of the carving ball, in the unit of the file.
+        alpha: f64,
+        /// Distance of the wrap's vertices from the input, in the unit of the file.
+        offset: f64,
+        /// Largest distance of the wrap from the input, to within 1 %, in the unit of the file.
+        farthest: f64,
+    },
     /// Outer shells that pointed inward as a whole were turned over.
     TurnedOutward { components: usize },
     /// Shells of cavities that pointed outward were turned over.
@@ -300,6 +323,7 @@ impl Repair {
                 | Self::ResolvedFaces { .. }
                 | Self::SeparatedVertices { .. }
                 | Self::FilledHole { .. }
+                | Self::Wrapped { .. }
                 | Self::DroppedComponents { .. }
         )
     }
@@ -320,7 +344,10 @@ impl Repair {
             Self::TurnedOutward { components }
             | Self::TurnedInward { components }
             | Self::DroppedComponents { components, .. } => (components, "component"),
-            Self::FilledHole { triangles, .. } => (triangles, "triangle"),
+            Self::Wrapped { triangles: 0, points, .. } => (points, "point"),
+            Self::FilledHole { triangles, .. } | Self::Wrapped { triangles, .. } => {
+                (triangles, "triangle")
+            }
         }
     }
 }
@@ -371,6 +398,11 @@ impl fmt::Display for Repair {
             Self::FilledHole { edges, .. } => {
                 write!(f, "filled a hole of {} with {what}", counted(edges, "edge"))
             }
+            Self::Wrapped { alpha, offset, farthest, .. } => write!(
+                f,
+                "wrapped {what} with alpha {alpha:.3e} and offset {offset:.3e}; the wrap contains the input and is at \
+                 most {farthest:.3e} away from it"
+            ),
             Self::TurnedOutward { .. } => write!(f, "turned {what} outward"),
             Self::TurnedInward { .. } => {
                 write!(f, "turned {what} inward, as a wall of a cavity in a solid")

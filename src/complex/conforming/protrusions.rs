@@ -3,10 +3,9 @@
 use rayon::prelude::*;
 
 use super::Refinement;
-use super::refine::PointGrid;
 use super::skin::{Place, Skin, key, sides};
 use crate::Vec3;
-use crate::surface::TriangleBvh;
+use crate::surface::{PointGrid, TriangleBvh};
 
 /// Distance to a segment below which a point moves onto it, as a share of the tolerated depth.
 const SNAP: f64 = 0.25;
