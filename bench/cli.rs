@@ -47,7 +47,7 @@ enum Verb {
     Render(cmd::render::Arguments),
     /// Show medial meshes side by side in three dimensions, as one page.
     View(cmd::view::Arguments),
-    /// Repair a surface: fill its holes, keep its largest part.
+    /// Repair a surface: fill its holes, keep its largest part, wrap it.
     Repair(cmd::repair::Arguments),
     /// Convert between surface formats, or between medial mesh formats.
     Convert(cmd::convert::Arguments),

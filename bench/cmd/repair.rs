@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use medial::surface::{self, Components, MendOptions};
+use medial::surface::{self, Components, MendOptions, WrapOptions};
 use serde_json::json;
 
 use crate::args::Global;
@@ -24,6 +24,13 @@ pub struct Arguments {
     /// Separate parts that touch in a vertex, by a thousandth of the size of their faces.
     #[arg(long)]
     separate: bool,
+    /// Replace the surface by a closed one around it, also around an open or non-manifold surface or points
+    ///
+    /// ALPHA is a fraction of the bounding box's diagonal, 0.02 by default. Openings narrower than about twice ALPHA and enclosed
+    /// cavities are filled. The vertices of the new surface are ALPHA / 30 away from the input. The number of faces grows with
+    /// 1 / ALPHA^2.
+    #[arg(long, value_name = "ALPHA", conflicts_with_all = ["fill_holes", "separate"])]
+    wrap: Option<Option<f64>>,
     /// Keep these parts.
     #[arg(long, value_enum, default_value_t = Keep::All)]
     components: Keep,
@@ -50,7 +57,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let Arguments { fill_holes, separate, .. } = *arguments;
     let options = MendOptions { fill_holes, separate, components };
     // An error unless the repaired surface bounds a solid.
-    let inspected = surface::inspect(&arguments.input);
+    let inspected = match arguments.wrap {
+        Some(alpha) => surface::inspect_wrapped(&arguments.input, wrap_options(alpha)?),
+        None => surface::inspect(&arguments.input),
+    };
     let repaired = inspected.and_then(|found| found.mend(options)).map_err(Failure::input)?;
     surface::write(&arguments.output, &repaired.mesh).map_err(Failure::input)?;
     let report = repaired.report;
@@ -62,4 +72,12 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let mut text = format!("{output}: {vertices} vertices, {faces} faces");
     report.repairs.iter().for_each(|repair| text += &format!("\n  repaired: {repair}"));
     Ok(print_result(global, &object, &text, &report.warnings))
+}
+
+fn wrap_options(alpha: Option<f64>) -> Result<WrapOptions, Failure> {
+    match alpha {
+        None => Ok(WrapOptions::default()),
+        Some(alpha) if alpha > 0.0 && alpha.is_finite() => Ok(WrapOptions::with_alpha(alpha)),
+        Some(_) => Err(Failure::usage("--wrap must be a positive fraction, for example 0.02")),
+    }
 }

@@ -196,6 +196,61 @@ fn a_surface_with_a_hole_and_a_second_part_is_repaired() {
     assert_eq!((code, &object["components"]), (0, &1.into()), "{object}");
 }
 
+/// An open strip of two triangles, the corners of a box without faces, and three triangles at one edge.
+const UNFIT: [&str; 3] = [
+    "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 1\n3 0 1 2\n3 0 2 3\n",
+    "OFF\n8 0 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n",
+    "OFF\n5 3 0\n0 0 0\n0 0 1\n1 0 0\n0 1 0\n-1 -1 0\n3 0 1 2\n3 0 1 3\n3 0 1 4\n",
+];
+
+#[test]
+fn surfaces_and_points_that_bound_no_solid_are_wrapped() {
+    let at = folder();
+    let (unfit, wrapped) = (at("unfit.off"), at("wrapped.off"));
+    for (text, components) in UNFIT.iter().zip([1, 8, 1]) {
+        fs::write(&unfit, text).expect("written");
+        assert_eq!(run(&["info", &unfit]).0, 1, "{text}");
+        let (code, object) = json(&["repair", &unfit, "--wrap", "-o", &wrapped]);
+        assert_eq!((code, &object["components"]), (0, &components.into()), "{object}");
+        let repair = object["repairs"].as_array().and_then(|all| all.last()).expect("a repair");
+        assert_eq!(repair["repair"], "wrapped", "{object}");
+        let [alpha, offset, farthest] =
+            ["alpha", "offset", "farthest"].map(|key| repair[key].as_f64().expect("a length"));
+        assert!((alpha / offset - 30.0).abs() < 1e-9 && farthest >= 0.98 * offset, "{object}");
+        let text = done(&["info", &wrapped]);
+        assert!(!text.contains("intersect"), "{text}");
+    }
+    let (code, object) =
+        json(&["repair", &unfit, "--wrap", "0.1", "--components", "largest", "-o", &wrapped]);
+    let fewer = object["vertices"].as_u64().expect("a count");
+    assert_eq!(code, 0, "{object}");
+    let (_, object) = json(&["repair", &unfit, "--wrap", "0.05", "-o", &wrapped]);
+    assert!(object["vertices"].as_u64() > Some(2 * fewer), "{object}");
+}
+
+#[test]
+fn a_wrap_without_a_radius_or_with_wrong_input_is_refused() {
+    let at = folder();
+    let (unfit, wrapped) = (at("unfit.off"), at("wrapped.off"));
+    fs::write(&unfit, UNFIT[0]).expect("written");
+    for alpha in ["0", "-0.1", "nan", "inf"] {
+        let words = ["repair", &unfit, "-o", &wrapped, &format!("--wrap={alpha}")];
+        refused(&words, 2, "--wrap must be a positive fraction");
+    }
+    for other in ["--fill-holes", "--separate"] {
+        refused(&["repair", &unfit, "-o", &wrapped, "--wrap", other], 2, "cannot be used with");
+    }
+    let words = ["repair", &unfit, "-o", &wrapped, "--wrap"];
+    refused(&[&words[..4], &["--wrap=1e-12"]].concat(), 1, "the offset is too small");
+    fs::write(&unfit, UNFIT[0].replace("1 1 0", "1 nan 0")).expect("written");
+    refused(&words, 1, "not finite");
+    fs::write(&unfit, "OFF\n0 0 0\n").expect("written");
+    refused(&words, 1, "no face among 0 vertices");
+    fs::write(&unfit, "OFF\n1 0 0\n1 2 3\n").expect("written");
+    refused(&words, 1, "the bounding box has the diagonal 0.0");
+    assert!(!fs::exists(&wrapped).expect("a folder"));
+}
+
 /// The artifact of a record may name any file of the machine: a report neither shows nor copies it.
 #[cfg(unix)]
 #[test]
