@@ -300,7 +300,7 @@ pub enum Repair {
         alpha: f64,
         /// Distance of the wrap's vertices from the input, in the unit of the file.
         offset: f64,
-        /// Largest distance of the wrap from the input, to within 1 %, in the unit of the file.
+        /// Bound on the distance of the wrap from the input, at most 1 % above the largest one, in the unit of the file.
         farthest: f64,
     },
     /// Outer shells that pointed inward as a whole were turned over.

@@ -41,7 +41,7 @@ impl Default for WrapOptions {
     }
 }
 
-/// Tolerance of [`farthest`], as a fraction of the distance.
+/// Excess of [`farthest`] over the largest distance, as a fraction of it.
 const FARTHEST_TOLERANCE: f64 = 0.01;
 
 /// Reads a surface of any kind, or points without faces, and wraps it: see [`wrap`]. The file may be open, not
@@ -126,7 +126,7 @@ fn scaled_farthest(points: &[Vec3], triangles: &[[u32; 3]], mesh: &TriMesh) -> f
     unit.restore(Vec3::splat(found)).x
 }
 
-/// Largest distance of a surface's points from the triangles, to within [`FARTHEST_TOLERANCE`].
+/// Bound on the distance of a surface's points from the triangles, at most [`FARTHEST_TOLERANCE`] above the largest one.
 ///
 /// The distance from one triangle is convex, so over a face it is largest at a corner. Faces where this bound from the
 /// triangle nearest to their centre exceeds the largest distance found are quartered.
@@ -145,7 +145,7 @@ pub(super) fn farthest(points: &[Vec3], triangles: &[[u32; 3]], mesh: &TriMesh) 
         });
         parts = open.flat_map(|(part, _)| quartered(*part)).collect();
     }
-    most
+    most * (1.0 + FARTHEST_TOLERANCE)
 }
 
 fn quartered([a, b, c]: [Vec3; 3]) -> [[Vec3; 3]; 4] {
