@@ -60,6 +60,9 @@ pub struct SubstrateArguments {
     /// Set the seed of every random choice [default: 0].
     #[arg(long)]
     pub seed: Option<u64>,
+    /// Refuse a surface that crosses or touches itself, or closes only after vertices within a distance are merged.
+    #[arg(long)]
+    pub as_is: bool,
 }
 
 impl SubstrateArguments {

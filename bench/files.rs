@@ -12,9 +12,17 @@ use medial_run::journal::replace_file;
 use crate::exit::Failure;
 
 /// Reads a surface or makes a built-in one, and the shape of it. Errors name the surface. Fails when it does not exist,
-/// is refused, or has no extent.
-pub fn shape_of(mesh: &Path, options: ShapeOptions) -> Result<(Input, Shape), Failure> {
-    let input = Input::load(&Source::parse(mesh)?)?;
+/// is refused, has no extent, or is changed by reading it though it `is_as_is`.
+pub fn shape_of(
+    mesh: &Path,
+    options: ShapeOptions,
+    is_as_is: bool,
+) -> Result<(Input, Shape), Failure> {
+    let source = Source::parse(mesh)?;
+    if is_as_is {
+        source.check_as_is()?;
+    }
+    let input = Input::load(&source)?;
     let shape = input.shape(options).map_err(|error| Failure::at(mesh, error))?;
     Ok((input, shape))
 }

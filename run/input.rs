@@ -99,6 +99,17 @@ impl Source {
         }
     }
 
+    /// Refuses a surface file that bounds a solid only after changes.
+    ///
+    /// # Errors
+    /// The error names the file and its defect.
+    pub fn check_as_is(&self) -> Result<(), InputError> {
+        match self.path() {
+            Some(path) => Ok(surface::inspect(path)?.as_is().map(|_| ())?),
+            None => Ok(()),
+        }
+    }
+
     /// The default meshes of a comparison: few built-in shapes, so that it ends soon, on which methods differ.
     pub fn examples() -> Vec<Self> {
         EXAMPLES.map(|id| Self::BuiltIn { id: id.into(), resolution: None }).into()

@@ -11,7 +11,7 @@ from pathlib import Path
 
 HOSTILE = ("0 -0 -1 1 3 255 2147483648 4294967295 4294967296 1e-320 1e-155 1e-100 1e57 1e155 1e308 inf nan 0.1e").split()
 SURFACE = ["info {}", "simplify {} -m qmat --spheres 20 -q -o OUT.ma", "evaluate {} AXIS --samples 200",
-           "repair {} -o OUT.off --fill-holes --separate"]
+           "repair {} -o OUT.off --fill-holes"]
 MEDIAL_MESH = ["evaluate builtin:box:8 {} --samples 200", "reconstruct {} -o OUT.ply --tolerance 0.05",
                "convert {} OUT.ply", "simplify builtin:box:8 -m qmat --spheres 9 -q --initial {} -o OUT.ma"]
 SECONDS = 10

@@ -32,7 +32,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let line = global.stages();
     line.at("reading");
     let mut stages = StageCosts::default();
-    let (input, shape) = stages.timed("read", || shape_of(&arguments.mesh, options))?;
+    let (input, shape) =
+        stages.timed("read", || shape_of(&arguments.mesh, options, arguments.substrate.as_is))?;
     line.at("computing the medial mesh");
     let mesh = shape.voronoi().map_err(|error| Failure::at(&arguments.mesh, error))?;
     line.at("counting components, loops and voids");

@@ -145,6 +145,9 @@ pub fn run(
     arguments.apply_to_methods(&mut study, registry)?;
     let provenance = provenance();
     let mut items = study.items(registry, &provenance)?;
+    if arguments.substrate.as_is {
+        study.sources()?.iter().try_for_each(Source::check_as_is)?;
+    }
     study.external_remarks()?.iter().for_each(|remark| note(global, remark));
     let edition = Edition::of(&study)?;
     edition.iter().try_for_each(|edition| edition.check(&study, &items))?;

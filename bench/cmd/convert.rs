@@ -147,7 +147,7 @@ impl LookArguments {
     /// together.
     fn read(&self, from: &Path, options: AxisOptions) -> Result<(LoadedMa, Look), Failure> {
         if let Some(surface) = &self.mesh {
-            let (_, shape) = shape_of(surface, ShapeOptions::default())?;
+            let (_, shape) = shape_of(surface, ShapeOptions::default(), false)?;
             let loaded = read_axis(from, &shape, options)?.0;
             let values = Some(SphereValues::error(errors(&loaded.mesh, &shape)?));
             return Ok((loaded, Look { values, balls: self.spheres }));

@@ -65,7 +65,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     };
     let line = global.stages();
     line.at("reading");
-    let (input, shape) = shape_of(&arguments.mesh, ShapeOptions::default())?;
+    let (input, shape) = shape_of(&arguments.mesh, ShapeOptions::default(), false)?;
     line.at("preparing the surface");
     let judge = shape
         .judge(input.axis.as_ref(), options)
@@ -88,7 +88,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         let place = |edition: &Edition| edition.place(&input.hash, &row.evaluation, registry);
         row.place = edition.as_ref().map(place);
     }
-    let warnings = &input.report.warnings;
+    let warnings = &[&input.report.warnings[..], &shape.remarks()].concat();
     // One file keeps the exit codes and the object of a single evaluation.
     if rows.len() == 1 {
         let row = rows.remove(0)?;

@@ -145,7 +145,11 @@ type Read = (Option<Shape>, Option<MedialMesh>, Vec<String>);
 fn read(arguments: &Arguments) -> Result<Read, Failure> {
     let options = arguments.substrate.shape_options()?;
     let mut warnings = Vec::new();
-    let loaded = arguments.mesh.as_ref().map(|mesh| shape_of(mesh, options)).transpose()?;
+    let loaded = arguments
+        .mesh
+        .as_ref()
+        .map(|mesh| shape_of(mesh, options, arguments.substrate.as_is))
+        .transpose()?;
     let shape = loaded.map(|(input, shape)| {
         warnings.extend(input.report.warnings);
         shape

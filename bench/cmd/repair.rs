@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use medial::surface::{self, Components, MendOptions, WrapOptions};
 use serde_json::json;
 
@@ -21,28 +21,16 @@ pub struct Arguments {
     /// Close holes of up to 500 edges by triangles between their vertices.
     #[arg(long)]
     fill_holes: bool,
-    /// Separate parts that touch in a vertex, by a thousandth of the size of their faces.
-    #[arg(long)]
-    separate: bool,
     /// Replace the surface by a closed one around it, also around an open or non-manifold surface or points
     ///
     /// ALPHA is a fraction of the bounding box's diagonal, 0.02 by default. Openings narrower than about twice ALPHA and enclosed
     /// cavities are filled. The vertices of the new surface are ALPHA / 30 away from the input. The number of faces grows with
     /// 1 / ALPHA^2.
-    #[arg(long, value_name = "ALPHA", conflicts_with_all = ["fill_holes", "separate"])]
+    #[arg(long, value_name = "ALPHA", conflicts_with = "fill_holes")]
     wrap: Option<Option<f64>>,
-    /// Keep these parts.
-    #[arg(long, value_enum, default_value_t = Keep::All)]
-    components: Keep,
-}
-
-/// Parts of the result.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Keep {
-    /// The part with the largest area.
-    Largest,
-    /// All parts.
-    All,
+    /// Keep all parts, the largest, the N largest, or those with a SHARE of the area (0.01 drops dust).
+    #[arg(long, default_value = "all", value_name = "all|largest|N|SHARE")]
+    components: Components,
 }
 
 /// Runs the verb. Nothing is written unless the result bounds a solid. Fails when the surface cannot be read, is still
@@ -50,12 +38,8 @@ enum Keep {
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     check_folder(&arguments.output)?;
     check_apart(Some(&arguments.output), [arguments.input.as_path()])?;
-    let components = match arguments.components {
-        Keep::Largest => Components::Largest,
-        Keep::All => Components::All,
-    };
-    let Arguments { fill_holes, separate, .. } = *arguments;
-    let options = MendOptions { fill_holes, separate, components };
+    let Arguments { fill_holes, components, .. } = *arguments;
+    let options = MendOptions { fill_holes, components };
     // An error unless the repaired surface bounds a solid.
     let inspected = match arguments.wrap {
         Some(alpha) => surface::inspect_wrapped(&arguments.input, wrap_options(alpha)?),

@@ -69,7 +69,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     check_apart(arguments.output.as_deref(), read)?;
     let line = global.stages();
     line.at("reading");
-    let (input, mut shape) = shape_of(&arguments.mesh, options)?;
+    let (input, mut shape) = shape_of(&arguments.mesh, options, arguments.substrate.as_is)?;
     if arguments.output.is_none() && !global.json {
         let example = format!("{}-{}.ma", file_stem(&input.name), entry.id());
         return Err(Failure::usage(format!(

@@ -34,8 +34,7 @@ class Surface:
         path: str,
         off: bytes | None,
         fill_holes: bool,
-        separate: bool,
-        largest: bool,
+        components: str,
         name: str | None,
         call: _Call,
     ) -> Surface: ...

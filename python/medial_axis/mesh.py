@@ -103,8 +103,7 @@ class Mesh:
         faces: Any = None,
         *,
         fill_holes: bool = False,
-        separate: bool = False,
-        components: Literal["all", "largest"] = "all",
+        components: str | int | float = "all",
         name: str | None = None,
         threads: int | None = None,
         progress: Progress | None = None,
@@ -115,8 +114,7 @@ class Mesh:
             vertices: A file; or n x 3 positions, or a mesh of another package, as for `Mesh`.
             faces: m x 3 indices of vertices, from 0.
             fill_holes: Close holes by triangles between their vertices.
-            separate: Move parts that touch in a vertex apart there, by a thousandth of the size of its faces.
-            components: Keep all parts, or the largest one.
+            components: Keep `all` parts, the `largest`, a number of the largest, or those with a share of the area below 1.
             name: Name in tables; by default the stem of the file.
             threads: Threads of a separate pool; by default all calls share one.
             progress: Called with a stage and its completed share.
@@ -126,7 +124,7 @@ class Mesh:
 
         Raises:
             InputError: The surface still bounds no solid.
-            ParameterError: `components` is another word.
+            ParameterError: `components` is something else.
 
         Example:
             >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -134,21 +132,17 @@ class Mesh:
             >>> len(mesh.faces), mesh.report()["repairs"][0]["repair"]
             (4, 'filled_hole')
         """
-        if components not in ("all", "largest"):
-            raise ParameterError(f"components: expected all or largest, found {components!r}")
         path, off = "mesh", None
         if faces is None and isinstance(vertices, (str, os.PathLike)):
             path = path_text(vertices)
         else:
             given = _foreign(vertices) if faces is None else (vertices, faces)
             off = _off(floats(given[0], "vertices"), indices(given[1], "faces", 3))
-        largest = components == "largest"
         made = _medial.Surface.repair(
             path,
             off,
             bool(fill_holes),
-            bool(separate),
-            largest,
+            str(components),
             None if name is None else str(name),
             call(0, threads, progress),
         )

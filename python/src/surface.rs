@@ -165,13 +165,14 @@ impl Surface {
         path: PathBuf,
         off: Option<Vec<u8>>,
         fill_holes: bool,
-        separate: bool,
-        largest: bool,
+        components: &str,
         name: Option<String>,
         call: Call,
     ) -> PyResult<Self> {
-        let components = if largest { Components::Largest } else { Components::All };
-        let options = MendOptions { fill_holes, separate, components };
+        let components = components.parse::<Components>();
+        let components = components
+            .map_err(|why| Failure::new(Kind::Parameter, format!("components: {why}")))?;
+        let options = MendOptions { fill_holes, components };
         long(py, &call, move |_, monitor| {
             monitor.at("repairing");
             let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();

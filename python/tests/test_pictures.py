@@ -148,7 +148,7 @@ def test_repairs(tmp_path: Path) -> None:
     touching = np.vstack([vertices, -vertices[1:]]), np.vstack([faces, np.array([0, 4, 5, 6])[faces][:, ::-1]])
     with pytest.raises(InputError):
         Mesh.repair(touching)
-    assert len(Mesh.repair(touching, separate=True).vertices) == 8
+    assert len(Mesh.repair(touching).vertices) == 8
     with pytest.raises(ParameterError, match="components"):
         Mesh.repair(*two, components="both")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="nowhere.off"):

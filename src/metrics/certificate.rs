@@ -95,7 +95,7 @@ pub fn certify(
     let depths = in_morton_order(&surface.vertices, |near, p| boundary.of(p, near).upper);
     let vertices = surface.vertices.iter().zip(depths);
     let vertices = vertices.map(|(&point, distance)| Peak { point, distance }).collect();
-    let deepest = boundary.deepest_of(vertices);
+    let deepest = boundary.deepest_of(vertices).0;
     let Peak { point, distance } =
         deepest.unwrap_or(Peak { point: surface.vertices[0], distance: 0.0 });
     let mut largest = Largest::above(distance);

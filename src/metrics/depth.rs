@@ -241,8 +241,8 @@ impl<'a> Boundary<'a> {
     }
 
     /// The largest distance to the boundary of some points, each given with an upper bound of its distance; a
-    /// lower bound of it after searches over too many pieces.
-    pub fn deepest_of(&self, mut peaks: Vec<Peak>) -> Option<Peak> {
+    /// lower bound of it after searches over too many pieces. With whether they were not too many.
+    pub fn deepest_of(&self, mut peaks: Vec<Peak>) -> (Option<Peak>, bool) {
         peaks.sort_by(|a, b| b.distance.total_cmp(&a.distance));
         let (mut best, mut near, mut left): (Option<Peak>, _, _) = (None, 0, MAX_PIECES);
         let mut depths = vec![None; peaks.len()];
@@ -265,12 +265,12 @@ impl<'a> Boundary<'a> {
                 }
             }
         }
-        best
+        (best, left > 0)
     }
 
     /// Points with the deepest of them first, and no distance above its distance.
     pub fn proven(&self, mut peaks: Vec<Peak>) -> Vec<Peak> {
-        let Some(deepest) = self.deepest_of(peaks.clone()) else { return peaks };
+        let Some(deepest) = self.deepest_of(peaks.clone()).0 else { return peaks };
         peaks.iter_mut().for_each(|peak| peak.distance = peak.distance.min(deepest.distance));
         peaks.insert(0, deepest);
         peaks

@@ -81,7 +81,15 @@ pub(super) fn distances_with_envelope(
     let reverse = largest(&envelope.distances);
     let on_mesh = OnMesh { mesh: bvh, value: depth_at };
     forward.extend(start.peaks());
-    let deepest = |peaks| boundary.deepest_of(peaks).map_or(0.0, |peak| peak.distance);
+    let sampled_depth = largest(&depths);
+    // After too many pieces of a boundary with hairline gaps, the samples' depths are better known than bounds of them.
+    let deepest = |peaks| match boundary.deepest_of(peaks) {
+        (Some(peak), true) => peak.distance,
+        (peak, is_found) => {
+            let least = if is_found { 0.0 } else { sampled_depth };
+            peak.map_or(least, |peak| peak.distance.max(least))
+        }
+    };
     // The distance to the boundary is at least `mu` at every point, so the maximum found for `mu` bounds it, too.
     let epsilon_union = deepest(forward).max(epsilon);
     let known = epsilon_union.max(reverse);

@@ -37,7 +37,7 @@ const PIECES: usize = 16;
 const MOST_PIECES: usize = 1 << 18;
 
 /// Limit of pieces of the boundary in all searches of one round.
-const SEARCHED: usize = 1 << 22;
+const SEARCHED: usize = 1 << 18;
 
 /// Limit of distances of the sweep from which an ascent starts.
 const SEEDS: usize = 6;

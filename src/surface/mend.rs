@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::PI;
+use std::str::FromStr;
 
 use super::report::{Fault, Repair, VertexName};
 use super::soup::PolygonSoup;
@@ -10,24 +11,39 @@ use super::{Inspection, Loaded, SurfaceError, TriMesh, inspected};
 use crate::Vec3;
 
 /// Which parts of a surface are kept.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Components {
     /// All of them.
     #[default]
     All,
-    /// The one of the largest area, the first of several.
-    Largest,
+    /// Some of the largest area, the first of equal ones; one at least.
+    Largest(usize),
+    /// Those with a share of the whole area; the largest at least.
+    Share(f64),
+}
+
+impl FromStr for Components {
+    type Err = String;
+
+    /// `all`, `largest`, a number of components, or a share below 1.
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, text.parse::<usize>(), text.parse::<f64>()) {
+            ("all", ..) => Ok(Self::All),
+            ("largest", ..) => Ok(Self::Largest(1)),
+            (_, Ok(number), _) if number > 0 => Ok(Self::Largest(number)),
+            (_, _, Ok(share)) if share > 0.0 && share < 1.0 => Ok(Self::Share(share)),
+            _ => Err("expected all, largest, a number of parts, or a share of the area below 1"
+                .to_owned()),
+        }
+    }
 }
 
 /// Repairs on demand, besides those of [`read`](super::read).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MendOptions {
     /// Whether holes are closed by triangles between their vertices, with the largest dihedral angle
-    /// as small as possible.
+    /// as small as possible. Parts that touch in a vertex are separated before.
     pub fill_holes: bool,
-    /// Whether parts that touch in a vertex are moved apart there, by a thousandth of the size of the
-    /// faces at the vertex.
-    pub separate: bool,
     /// Which parts are kept.
     pub components: Components,
 }
@@ -64,15 +80,11 @@ fn mended(inspection: Inspection, options: MendOptions) -> Result<Loaded, Surfac
     let mut repairs = report.repairs;
     // The examination of the result repeats its warnings; a failed one has none of the reader.
     let mut warnings = if refused.is_some() { Vec::new() } else { report.warnings };
-    if options.components == Components::Largest {
-        repairs.extend(keep_largest(&mut mesh));
-    }
+    repairs.extend(keep(&mut mesh, options.components));
     let TriMesh { mut vertices, mut faces } = mesh;
-    // Before the holes: their loops pass a vertex once only if its fans are separate.
-    if options.separate {
-        repairs.extend(separate(&mut vertices, &mut faces));
-    }
     if options.fill_holes {
+        // The loops of holes pass a vertex once only if its fans are separate.
+        repairs.extend(separate(&mut vertices, &mut faces));
         repairs.extend(fill(&vertices, &mut faces)?);
     }
     let mended = inspected(PolygonSoup::of_triangles(&vertices, &faces)?)?;
@@ -87,8 +99,11 @@ fn mended(inspection: Inspection, options: MendOptions) -> Result<Loaded, Surfac
     Ok(loaded)
 }
 
-/// Keeps the faces of the largest component.
-fn keep_largest(mesh: &mut TriMesh) -> Option<Repair> {
+/// Keeps the faces of some components.
+fn keep(mesh: &mut TriMesh, which: Components) -> Option<Repair> {
+    if which == Components::All {
+        return None;
+    }
     let component = Topology::new(mesh.vertices.len(), &mesh.faces).component;
     let components = component.iter().max().map_or(0, |&last| last as usize + 1);
     let mut areas = vec![0.0; components];
@@ -96,14 +111,23 @@ fn keep_largest(mesh: &mut TriMesh) -> Option<Repair> {
         let [a, b, c] = mesh.triangle(face);
         areas[component as usize] += (b - a).cross(c - a).length();
     }
-    let largest = (0..components).max_by(|&a, &b| areas[a].total_cmp(&areas[b]).then(b.cmp(&a)))?;
-    let all = mesh.faces.len();
+    let mut by_area: Vec<usize> = (0..components).collect();
+    by_area.sort_by(|&a, &b| areas[b].total_cmp(&areas[a]).then(a.cmp(&b)));
+    let all: f64 = areas.iter().sum();
+    let number = match which {
+        Components::All => components,
+        Components::Largest(number) => number,
+        Components::Share(share) => by_area.iter().filter(|&&c| areas[c] >= share * all).count(),
+    };
+    let mut is_kept = vec![false; components];
+    by_area.iter().take(number.max(1)).for_each(|&c| is_kept[c] = true);
+    let faces = mesh.faces.len();
     // `retain` visits faces in order, so the iterator keeps pace with it.
     let mut of_face = component.iter();
-    mesh.faces.retain(|_| of_face.next() == Some(&(largest as u32)));
-    let dropped =
-        Repair::DroppedComponents { components: components - 1, faces: all - mesh.faces.len() };
-    (components > 1).then_some(dropped)
+    mesh.faces.retain(|_| of_face.next().is_some_and(|&c| is_kept[c as usize]));
+    let components = is_kept.iter().filter(|&&kept| !kept).count();
+    let dropped = Repair::DroppedComponents { components, faces: faces - mesh.faces.len() };
+    (components > 0).then_some(dropped)
 }
 
 // Closes holes of a surface by triangles between their vertices; no vertex is moved or added.

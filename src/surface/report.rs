@@ -135,35 +135,38 @@ pub enum Fault {
     /// Edges with one face only.
     #[error(
         "the surface is open: {} with one face only, the first from {} to {}; fill its holes \
-         (`medial repair --fill-holes`)",
+         (`medial repair --fill-holes`) or wrap it (`medial repair --wrap`)",
         counted(*.edges, "edge"), .first[0], .first[1]
     )]
     Open { edges: usize, first: [VertexName; 2] },
     /// A hole that is too long to be filled.
-    #[error("the hole at {first}: too long to fill (found {edges} edges, expected at most {most})")]
+    #[error(
+        "the hole at {first}: too long to fill (found {edges} edges, expected at most {most}); \
+             wrap the surface (`medial repair --wrap`)"
+    )]
     LongHole { edges: usize, most: usize, first: VertexName },
     /// A hole that no triangles close.
     #[error(
         "the hole at {first} meets itself or an inner wall, or only edges that are there already \
-         would close it"
+         would close it; wrap the surface (`medial repair --wrap`)"
     )]
     TangledHole { first: VertexName },
     /// Edges with more than two faces.
     #[error(
         "the surface is not manifold: {} with more than two faces, the first ({faces} faces) \
-         from {} to {}; remove inner walls and doubled parts in a mesh editor",
+         from {} to {}; wrap it (`medial repair --wrap`), or remove inner walls in a mesh editor",
         counted(*.edges, "edge"), .first[0], .first[1]
     )]
     NonManifoldEdge { edges: usize, first: [VertexName; 2], faces: usize },
     /// Vertices whose faces form more than one fan.
     #[error(
         "the surface is not manifold: {} where parts touch in a point, the first is {first}; \
-         separate the parts (`medial repair --separate`)",
+         wrap them (`medial repair --wrap`)",
         counted(*.vertices, "vertex")
     )]
     NonManifoldVertex { vertices: usize, first: VertexName },
     /// One-sided, such as a Klein bottle.
-    #[error("the component of face {face} is one-sided; no orientation of its faces is consistent")]
+    #[error("the component of face {face} is one-sided; wrap it (`medial repair --wrap`)")]
     NonOrientable { face: usize },
     /// A component whose two sides coincide.
     #[error(

@@ -232,8 +232,7 @@ proptest! {
 
 // Repairs on demand: holes filled, parts left out.
 
-const FILL: MendOptions =
-    MendOptions { fill_holes: true, separate: false, components: Components::All };
+const FILL: MendOptions = MendOptions { fill_holes: true, components: Components::All };
 
 fn mend(mesh: &TriMesh, options: MendOptions) -> Result<Loaded, SurfaceError> {
     surface::inspect_bytes("mesh.off", to_off(mesh).as_bytes()).unwrap().mend(options)
@@ -283,16 +282,13 @@ fn every_hole_is_reported_and_long_ones_are_refused() {
 }
 
 #[test]
-fn holes_that_meet_are_refused() {
+fn holes_that_meet_are_separated() {
     // Two windows with one common corner.
     let windows = |p: Vec3| {
         let in_window = |low: f64| p.x > low && p.x < low + 0.25 && p.y > low && p.y < low + 0.25;
         p.z == 1.0 && (in_window(0.25) || in_window(0.5))
     };
-    let fault = mend(&lattice_box(4, windows), FILL).expect_err("tangled").fault;
-    assert!(matches!(fault, Fault::TangledHole { .. }), "{fault}");
-    let options = MendOptions { separate: true, ..FILL };
-    let apart = mend(&lattice_box(4, windows), options).expect("closed");
+    let apart = mend(&lattice_box(4, windows), FILL).expect("closed");
     assert!((apart.report.volume.expect("closed") - 1.0).abs() < 1e-3);
 }
 
@@ -325,7 +321,7 @@ fn the_largest_part_is_kept() {
     let shift = both.vertices.len() as u32;
     both.faces.splice(0..0, small.faces.iter().map(|face| face.map(|v| v + shift)));
     both.vertices.extend(small.vertices.iter().map(|&v| v * 0.5 + Vec3::splat(3.0)));
-    let options = MendOptions { components: Components::Largest, ..MendOptions::default() };
+    let options = MendOptions { components: Components::Largest(1), ..MendOptions::default() };
     let mended = mend(&both, options).expect("a solid");
     assert_eq!((mended.report.components, mended.mesh.faces.len()), (1, 48));
     assert!(
