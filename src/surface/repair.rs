@@ -86,15 +86,18 @@ pub(super) fn weld_within(vertices: &[Vec3], distance: f64) -> Vec<u32> {
     if distance == 0.0 {
         return weld(vertices);
     }
-    let place = |v: Vec3| (v / distance).floor().to_array().map(|x| x as i64);
-    let mut kept: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+    // As floating-point numbers, which hold the cells of vertices far from the origin as well as their coordinates do.
+    // Adding zero turns -0 into 0.
+    let key = |cell: Vec3| cell.to_array().map(|x| (x + 0.0).to_bits());
+    let mut kept: HashMap<[u64; 3], Vec<u32>> = HashMap::new();
     let mut near = |(i, &v): (u32, &Vec3)| {
-        let [x, y, z] = place(v);
-        let around = (0..27).map(|k| [x + k % 3 - 1, y + k / 3 % 3 - 1, z + k / 9 - 1]);
+        let cell = (v / distance).floor();
+        let step = |k: i32| f64::from(k % 3 - 1);
+        let around = (0..27).map(|k| key(cell + Vec3::new(step(k), step(k / 3), step(k / 9))));
         let candidates = around.filter_map(|cell| kept.get(&cell)).flatten().copied();
         let first = candidates.filter(|&k| vertices[k as usize].distance(v) <= distance).min();
         first.unwrap_or_else(|| {
-            kept.entry([x, y, z]).or_default().push(i);
+            kept.entry(key(cell)).or_default().push(i);
             i
         })
     };

@@ -335,3 +335,23 @@ fn surfaces_that_are_flat_after_the_repair_are_rejected() {
     let fault = mend(&triangle, FILL).expect_err("flat").fault;
     assert!(!fault.to_string().is_empty());
 }
+
+#[test]
+fn a_far_vertex_does_not_keep_others_from_being_welded() {
+    // A tetrahedron with a corner twice, 1e-10 apart, that is open without a weld, far from the origin and with an outlier.
+    let off = |far: f64| {
+        let x = |shift: f64| 2e6 + shift;
+        let near =
+            format!("{:?} 0 0\n{:?} 0 0\n{:?} 1 0\n{:?} 0 1\n", x(0.0), x(1.0), x(0.0), x(0.0));
+        format!(
+            "OFF\n6 4 0\n{near}{:?} 1e-7 0\n{far:?} 0 0\n3 0 2 1\n3 4 1 3\n3 0 3 2\n3 1 2 3\n",
+            x(0.0)
+        )
+    };
+    for far in [0.0, 1e30, -1e35] {
+        let loaded =
+            surface::read_bytes(off(far).as_bytes(), Format::Off).expect("closed by a weld");
+        let welded = |repair: &Repair| matches!(repair, Repair::WeldedWithin { vertices: 1, .. });
+        assert!(loaded.report.repairs.iter().any(welded), "{far}: {:?}", loaded.report.repairs);
+    }
+}
