@@ -152,7 +152,7 @@ pub fn is_store(dir: &Path, journal: &str) -> bool {
 }
 
 /// Refuses a folder with other files, and a folder with a link or a device among its `entries`, which this program
-/// writes or removes. The folder itself may be a link.
+/// reads, writes or removes. The folder itself may be a link.
 pub fn claim(dir: &Path, is_ours: bool, entries: &[DirEntry]) -> Result<(), Failure> {
     if dir.exists() && !dir.is_dir() {
         return Err(Failure::at(dir, "not a folder"));
@@ -168,8 +168,8 @@ pub fn claim(dir: &Path, is_ours: bool, entries: &[DirEntry]) -> Result<(), Fail
     for entry in entries {
         let kind = entry.file_type().map_err(io_error(&entry.path()))?;
         if !kind.is_file() && !kind.is_dir() {
-            let why = "not a regular file, but results are written here; remove it, or choose \
-                       another folder by --out";
+            let why =
+                "not a regular file, in a folder of results; remove it, or choose another folder";
             return Err(Failure::at(&entry.path(), why));
         }
     }
@@ -183,7 +183,7 @@ pub fn listed(dir: impl AsRef<Path>) -> impl Iterator<Item = DirEntry> {
 
 /// The entries of a store that belong to this program, by their names or by their folders. All other entries belong to
 /// the user. Folders come before their contents.
-fn entries_of(dir: &Path) -> Vec<DirEntry> {
+pub fn entries_of(dir: &Path) -> Vec<DirEntry> {
     let is_named = |entry: &DirEntry| {
         let name = entry.file_name();
         FILES.iter().chain(&FOLDERS).any(|own| *own == name) || is_temporary(entry)

@@ -8,6 +8,7 @@ use std::time::SystemTime;
 
 use clap::Args;
 use medial::metrics::DEFINITIONS;
+use medial::{read_regular, shortened};
 use medial_reports::{Header, editions, read_header};
 use medial_run::hash::hex_digest;
 use medial_run::journal::write_records;
@@ -22,7 +23,7 @@ use crate::files;
 use crate::output::print_result;
 use crate::provenance::provenance;
 use crate::rebuild::{Rebuilt, STUDY, of_items, rebuild, records, write_study};
-use crate::store::{AXES, PAGE, RESULTS, Store, artifact_path};
+use crate::store::{AXES, PAGE, RESULTS, Store, artifact_path, claim, entries_of};
 use crate::study::edition::{Description, EditionMesh};
 use crate::study::registry::Registry;
 use crate::study::{Study, unique_names};
@@ -62,6 +63,10 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     // While another process adds records, a page would be outdated at once.
     let held = (dir.is_dir() && !is_read).then(|| Store::open(dir, RESULTS, "medial report"));
     let held = held.transpose()?;
+    if is_read {
+        // The pages would show the file behind a link.
+        claim(dir, true, &entries_of(dir))?;
+    }
     let mut rebuilt = if is_read { None } else { Some(rebuild(dir, None, registry)?) };
     if let Some(site) = &arguments.site {
         // Somebody else's index.html must not be replaced.
@@ -157,7 +162,7 @@ fn merge(dirs: &[PathBuf], out: &Path) -> Result<Vec<String>, Failure> {
             notes.push(format!("{dir}: {artifact}: missing or not inside the folder; not merged"));
             continue;
         };
-        let bytes = fs::read(&from).map_err(|error| Failure::at(&from, error))?;
+        let bytes = read_regular(&from).map_err(|error| Failure::at(&from, error))?;
         files::write(&to, &bytes)?;
     }
     // The merged store gets the first study; its relative paths start at the folder that it names.
@@ -295,14 +300,22 @@ fn freeze(dir: &Path, records: &[Record], to: &Path, registry: &Registry) -> Res
         mesh,
     };
     let text = toml::to_string(&description).map_err(|error| Failure::at(to, error))?;
+    let inside = |folder: &Path, artifact: &String| {
+        let why = || format!("{}: not inside the folder", shortened(artifact));
+        artifact_path(folder, artifact).ok_or_else(|| Failure::at(folder, why()))
+    };
+    // Before the edition changes.
+    let read = kept.iter().map(|artifact| {
+        let from = inside(dir, artifact)?;
+        read_regular(&from).map_err(|error| Failure::at(&from, error))
+    });
+    let contents: Vec<Vec<u8>> = read.collect::<Result<_, _>>()?;
     if to.join(editions::DESCRIPTION).exists() {
         // Those of the edition that this one replaces.
         let _ = fs::remove_dir_all(to.join(AXES));
     }
-    for artifact in &kept {
-        let [from, target] = [dir, to].map(|folder| folder.join(artifact));
-        let bytes = fs::read(&from).map_err(|error| Failure::at(&from, error))?;
-        files::write(&target, &bytes)?;
+    for (artifact, bytes) in kept.iter().zip(contents) {
+        files::write(&inside(to, artifact)?, &bytes)?;
     }
     files::write(&to.join(editions::RECORDS), &packed)?;
     files::write(&to.join(editions::DESCRIPTION), text.as_bytes())
