@@ -57,8 +57,12 @@ fn heading(diff: &Diff) -> String {
     };
     let [worse, better, changed] = [Meaning::Regression, Meaning::Improvement, Meaning::Changed]
         .map(|meaning| diff.count(meaning));
+    let missing = match diff.missing.len() {
+        0 => String::new(),
+        count => format!("; {} missing in the newer", counted(count, "result", "results")),
+    };
     format!(
-        "# {}\n\n{}, {}, {} among {}.",
+        "# {}\n\n{}, {}, {} among {}{missing}.",
         escape(&summary),
         counted(worse, "regression", "regressions"),
         counted(better, "improvement", "improvements"),

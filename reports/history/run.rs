@@ -7,7 +7,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use medial::{parser_message, read_regular_text};
+use jiff::Timestamp;
+use jiff::fmt::temporal::Pieces;
+use jiff::tz::Offset;
+use medial::{parser_message, quoted, read_regular_text};
 use medial_run::error::FileError;
 use medial_run::journal::replace_file;
 use medial_run::record::{Machine, Record, Stages, Status};
@@ -22,7 +25,7 @@ use crate::metric::median;
 /// The measurements of one build in one study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// Date of the commit, ISO 8601. Runs are sorted by it.
+    /// Date of the commit, ISO 8601: in UTC without an offset, and at midnight without a time. Runs are sorted by it.
     pub date: String,
     /// Hash of the commit.
     pub commit: String,
@@ -72,14 +75,7 @@ impl Run {
         if !(8..=64).contains(&commit.len()) || !commit.bytes().all(|b| b.is_ascii_hexdigit()) {
             return invalid(format!("--commit {commit}: expected 8 to 64 hexadecimal digits"));
         }
-        // The date is sorted as text and is part of a file name.
-        let is_date = date.len() >= 10
-            && date.bytes().enumerate().all(|(k, b)| match k {
-                4 | 7 => b == b'-',
-                0..10 => b.is_ascii_digit(),
-                _ => b.is_ascii_alphanumeric() || b"-+:.".contains(&b),
-            });
-        if !is_date {
+        if instant(date).is_none() {
             return invalid(format!("--date {date}: expected YYYY-MM-DD or YYYY-MM-DDTHH:MM:SSZ"));
         }
         let Some(last) = records.last() else { return invalid("no record".to_owned()) };
@@ -116,7 +112,7 @@ impl Run {
     }
 
     fn file_name(&self) -> String {
-        format!("{}-{}.json", &self.date[..10], &self.commit[..8])
+        format!("{:.10}-{:.8}.json", self.date, self.commit)
     }
 
     /// Stores the run in the folder of a history, which is created where it is missing: its file, and whether it is
@@ -146,10 +142,10 @@ impl Run {
         let text = read_regular_text(path).map_err(|error| FileError::at(path, error))?;
         let run: Self = serde_json::from_str(&text)
             .map_err(|error| FileError::at(path, parser_message(&error.to_string())))?;
-        let Self { date, commit, .. } = &run;
-        // Long enough to have a file name.
-        let is_named = date.len() >= 10 && commit.len() >= 8;
-        match is_named && path.file_name().is_some_and(|name| *name == *run.file_name()) {
+        if instant(&run.date).is_none() {
+            return Err(FileError::at(path, format!("unknown date {}", quoted(&run.date))));
+        }
+        match path.file_name().is_some_and(|name| *name == *run.file_name()) {
             true => Ok(run),
             false => Err(FileError::at(path, "date and commit do not match the file name")),
         }
@@ -171,8 +167,18 @@ pub fn read_runs(folder: &Path) -> Result<(Vec<Run>, Vec<FileError>), FileError>
         Run::read(&path).map_or_else(|error| damaged.push(error), |run| runs.push(run));
     }
     // Stable: runs of one date keep the order of their files.
-    runs.sort_by(|a, b| a.date.cmp(&b.date));
+    runs.sort_by_cached_key(|run| instant(&run.date));
     Ok((runs, damaged))
+}
+
+/// The instant of a date that begins with `YYYY-MM-DD`, which is part of a file name; `None` for an impossible one.
+fn instant(date: &str) -> Option<Timestamp> {
+    let parts = Pieces::parse(date).ok()?;
+    let is_plain =
+        parts.time_zone_annotation().is_none() && date.starts_with(&parts.date().to_string());
+    let offset = parts.to_numeric_offset().unwrap_or(Offset::UTC);
+    let local = parts.date().to_datetime(parts.time().unwrap_or_default());
+    offset.to_timestamp(local).ok().filter(|_| is_plain)
 }
 
 impl Point {

@@ -188,6 +188,13 @@ fn incomparable_records_are_listed_with_the_reason() {
 
     let difference = diff(&old, &old[1..]);
     assert_eq!((difference.missing.len(), difference.count(Meaning::Regression)), (1, 0));
-    assert!(difference.to_markdown().contains("only in the older"));
+    let markdown = difference.to_markdown();
+    assert!(markdown.contains("only in the older"));
+    assert!(
+        markdown
+            .lines()
+            .nth(2)
+            .is_some_and(|line| line.contains("; 1 result missing in the newer."))
+    );
     assert_eq!(diff(&old[1..], &old).added.len(), 1);
 }

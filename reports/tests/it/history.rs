@@ -92,6 +92,34 @@ fn runs_are_stored_once_and_read_back_in_order() {
     }
 }
 
+#[test]
+fn runs_are_sorted_by_the_instant_of_their_dates() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // By text the last is the third.
+    let dates = [
+        "2026-03-01T01:30:00+02:00", // 23:30 of the day before
+        "2026-03-01",
+        "2026-03-01T00:30",
+        "2026-03-02T00:30:00+05:00", // 19:30 of the day before
+        "2026-03-01T20:00:00Z",
+    ];
+    let some = records(0, |_, _| ());
+    for (k, date) in dates.iter().enumerate().rev() {
+        let run = Run::of_records(&some, &commit(k), date).expect("a run");
+        run.add_to(folder.path()).expect("added");
+    }
+    let (read, damaged) = read_runs(folder.path()).expect("read");
+    assert!(damaged.is_empty(), "{damaged:?}");
+    assert_eq!(read.iter().map(|run| &*run.date).collect::<Vec<_>>(), dates);
+    let path = folder.path().join("2026-03-01-00000000.json");
+    let whole = serde_json::to_string(&read[1]).expect("JSON");
+    for wrong in ["2026-02-30", "2026-03-0é", "2026-03-01T25:00"] {
+        fs::write(&path, whole.replacen("2026-03-01", wrong, 1)).expect("written");
+        let (read, damaged) = read_runs(folder.path()).expect("read");
+        assert_eq!((read.len(), damaged.len()), (4, 1), "{wrong}");
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn pipes_are_skipped_without_reading() {
@@ -117,7 +145,18 @@ fn records_of_more_than_one_run_are_rejected() {
     for wrong in ["HEAD", "abc", "../../etc/passwd", ""] {
         assert!(refused(&some, wrong, "2026-11-23").contains("hexadecimal"), "{wrong}");
     }
-    for wrong in ["today", "2026-1-1", "2026/01/01", "2026-01-01/../x", ""] {
+    for wrong in [
+        "today",
+        "2026-1-1",
+        "2026/01/01",
+        "2026-01-01/../x",
+        "",
+        "2026-02-30",
+        "2026-01-01T25:00Z",
+        "2026-01-01T12:00:00+99:00",
+        "20260101",
+        "2026-01-01T12:00[Europe/Paris]",
+    ] {
         assert!(refused(&some, &commit(0), wrong).contains("YYYY-MM-DD"), "{wrong}");
     }
     let changes: [fn(&mut Record); 2] = [
