@@ -80,13 +80,14 @@ impl ReconstructError {
     pub fn of_contour(error: ContourError, diagonal: f64, usual: f64) -> Self {
         let message = match error {
             ContourError::TooFine { tolerance, most, feasible } => {
-                let tolerance = tolerance / diagonal;
-                let first = if tolerance < usual { usual } else { 1.0 };
-                format!(
-                    "tolerance {} is too fine (more than {most} tetrahedra); give a tolerance of {:.1e}",
-                    significant(tolerance, 4),
-                    (feasible / diagonal).min(first)
-                )
+                let [tolerance, feasible] = [tolerance, feasible].map(|length| length / diagonal);
+                let advised = feasible.min(if tolerance < usual { usual } else { 1.0 });
+                let advice = match advised > tolerance && feasible < HOPELESS {
+                    true => format!("give a tolerance of {advised:.1e}"),
+                    false => "no tolerance works; check the units of the medial mesh".to_owned(),
+                };
+                let tolerance = significant(tolerance, 4);
+                format!("tolerance {tolerance} is too fine (more than {most} tetrahedra); {advice}")
             }
             ContourError::TooThin { feasible, .. } => format!(
                 "every sphere is too thin for this tolerance; give a tolerance of {:.1e} for the largest, or larger \
@@ -98,6 +99,9 @@ impl ReconstructError {
         Self { is_tolerance: true, message }
     }
 }
+
+/// Tolerances are at most 1. Feasible ones can be larger than the least that works by this factor.
+const HOPELESS: f64 = 5.0;
 
 /// Corners of a power crust that are nearer than this along it are merged, as a fraction of the diagonal.
 const COINCIDENT: f64 = 1e-6;
@@ -155,8 +159,11 @@ pub fn union_boundary(
     let diagonal = diagonal.or_else(|| Normalisation::of(&corners).map(|units| units.diagonal));
     let why = "the extent of the spheres is zero or not finite";
     let diagonal = diagonal.ok_or_else(|| ReconstructError::input(why))?;
-    let fitting = fitting_surface(axis, &union, diagonal, tolerance);
-    let Fitting { made, tolerance, off, betti } =
+    // Squares of tiny lengths would underflow.
+    let unit = axis.unit();
+    let (axis, diagonal) = (axis.transformed(1.0 / unit, |p| p / unit), diagonal / unit);
+    let fitting = fitting_surface(&axis, diagonal, tolerance);
+    let Fitting { mut made, tolerance, off, betti } =
         fitting.map_err(|error| ReconstructError::of_contour(error, diagonal, FINE))?;
     let mut warnings = Vec::new();
     if made.lost > 0 {
@@ -169,7 +176,8 @@ pub fn union_boundary(
     }
     let figures =
         Figures::Union { tetrahedra: made.tetrahedra, lost: made.lost, faces_to_union: off };
-    let (mesh, union_betti) = (made.mesh, betti);
+    made.mesh.vertices.iter_mut().for_each(|vertex| *vertex *= unit);
+    let (mesh, union_betti, diagonal) = (made.mesh, betti, diagonal * unit);
     Ok(Reconstruction { mesh, diagonal, tolerance, union_betti, figures, warnings })
 }
 
@@ -200,10 +208,10 @@ struct Fitting {
 /// The surface of a union at a tolerance in diagonals, or at the coarsest with the right topology.
 fn fitting_surface(
     axis: &MedialMesh,
-    union: &MedialUnion,
     diagonal: f64,
     tolerance: Option<f64>,
 ) -> Result<Fitting, ContourError> {
+    let union = MedialUnion::new(axis)?;
     let finest = tolerance.unwrap_or(FINE);
     // Fails for too many balls. Not before the surface, which is refused sooner.
     let betti = LazyCell::new(|| union_betti(axis, BALL_SPACING * finest * diagonal).ok());

@@ -74,8 +74,11 @@ pub enum ContourError {
          larger radii"
     )]
     TooSlender { largest: f64, most: usize },
-    /// All radii are zero.
-    #[error("all spheres have radius zero: their union has no inside")]
+    /// All radii are zero or subnormal.
+    #[error(
+        "all spheres have radius zero, or below {:.1e}: their union has no inside",
+        f64::MIN_POSITIVE
+    )]
     NoInside,
 }
 
@@ -88,6 +91,9 @@ const CONTRACTED: f64 = 0.25;
 /// Tetrahedra are refined to the radius of the union's balls, but no further than to this share of the
 /// edge that the tolerance requires.
 const MIN_SHARE_OF_CELL: f64 = 1.0 / 16.0;
+
+/// A feasible tolerance is larger than the least one by this factor, since messages round it.
+const ADVISED: f64 = 1.1;
 
 /// Bound on the number of tetrahedra: about 4 GB.
 const MAX_TETRAHEDRA: usize = 50_000_000;
@@ -127,25 +133,51 @@ pub fn union_surface_within(
     tolerance: f64,
     most: usize,
 ) -> Result<UnionSurface, ContourError> {
-    let union = MedialUnion::new(mesh)?;
+    mesh.check().map_err(UnionError::from)?;
     if !(tolerance > 0.0 && tolerance.is_finite()) {
         return Err(ContourError::Tolerance(tolerance));
     }
     let largest = mesh.spheres.iter().map(|m| m.radius).fold(0.0, f64::max);
-    if largest == 0.0 {
+    if largest < f64::MIN_POSITIVE && !mesh.spheres.is_empty() {
         return Err(ContourError::NoInside);
     }
+    // Products of three tiny lengths would underflow, and turn faces over.
+    let unit = mesh.unit();
+    let made = contour(&mesh.transformed(1.0 / unit, |p| p / unit), tolerance / unit, most);
+    let made = made.map_err(|error| match error {
+        ContourError::TooFine { most, feasible, .. } => {
+            ContourError::TooFine { tolerance, most, feasible: unit * feasible }
+        }
+        ContourError::TooThin { smallest, feasible } => {
+            ContourError::TooThin { smallest: unit * smallest, feasible: unit * feasible }
+        }
+        ContourError::TooSlender { most, .. } => ContourError::TooSlender { largest, most },
+        other => other,
+    });
+    let UnionSurface { mut mesh, tetrahedra, lost, smallest } = made?;
+    mesh.vertices.iter_mut().for_each(|vertex| *vertex *= unit);
+    Ok(UnionSurface { mesh, tetrahedra, lost, smallest: unit * smallest })
+}
+
+/// [`union_surface_within`] for lengths of about 1.
+fn contour(mesh: &MedialMesh, tolerance: f64, most: usize) -> Result<UnionSurface, ContourError> {
+    let union = MedialUnion::new(mesh)?;
+    let largest = mesh.spheres.iter().map(|m| m.radius).fold(0.0, f64::max);
     let longest = EDGE_SHARE * tolerance;
     let smallest = MIN_SHARE_OF_CELL * longest;
     // With edges of half its radius, a ball certainly contains a vertex.
     let too_thin = ContourError::TooThin { smallest, feasible: 0.5 * largest / EDGE_SHARE };
+    let (lo, hi) = union.bounding_box();
+    let extent = (hi - lo).max_element();
+    if 0.5 * largest < Bisection::of_cube(lo, 1.2 * extent).longest_edge(MAX_BISECTIONS) {
+        return Err(ContourError::TooSlender { largest, most });
+    }
     if largest < smallest {
         return Err(too_thin);
     }
     // A cube with the union in its inside. It is off centre by odd fractions, so that symmetric unions do not have
     // their boundary run through vertices.
-    let (lo, hi) = union.bounding_box();
-    let extent = (hi - lo).max_element().max(longest);
+    let extent = extent.max(longest);
     let margin = 0.1 * extent * Vec3::new(0.731, 0.617, 0.849);
     let mut grid = Bisection::of_cube(lo - margin, 1.2 * extent);
     let sizes: Vec<f64> = (0..=MAX_BISECTIONS).map(|g| grid.longest_edge(g)).collect();
@@ -166,9 +198,14 @@ pub fn union_surface_within(
         },
     );
     refined.map_err(|TooMany { generation, leaves }| {
-        // Feasible even if everything is thin and refined as far as possible.
-        let size = sizes[usize::from(generation)] / MIN_SHARE_OF_CELL;
-        let feasible = size / EDGE_SHARE * f64::max(1.0, (leaves as f64 / most as f64).sqrt());
+        let size = sizes[usize::from(generation)];
+        // Feasible even if everything thinner is refined as far as possible.
+        let least = mesh.spheres.iter().map(|m| m.radius).fold(largest, f64::min);
+        let size = if least < size { size / MIN_SHARE_OF_CELL } else { size };
+        // Three bisections make four of one. Predictions can be too low.
+        let share = leaves as f64 / most as f64;
+        let share = share.max((HOPELESS * share).min(1.0));
+        let feasible = ADVISED * size / EDGE_SHARE * share.sqrt();
         // Coarser ones are too thin, up to a factor of 2 that leaves room for the rounding of an advice.
         let shown = 0.5 * largest / (MIN_SHARE_OF_CELL * EDGE_SHARE);
         match shown < feasible && shown <= 2.0 * tolerance {
@@ -177,7 +214,7 @@ pub fn union_surface_within(
         }
     })?;
     if sizes[usize::from(goal)] > longest {
-        let feasible = sizes[usize::from(goal)] / EDGE_SHARE;
+        let feasible = ADVISED * sizes[usize::from(goal)] / EDGE_SHARE;
         return Err(ContourError::TooFine { tolerance, most, feasible });
     }
     let (raw, edges) = march(&grid, &union);

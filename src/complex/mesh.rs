@@ -7,6 +7,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::Vec3;
+use crate::geometry::planar_frame::power_of_two_below;
 use crate::geometry::{Sphere, TriangleTree, triangles_cross};
 use crate::surface::Normalisation;
 
@@ -209,6 +210,13 @@ impl MedialMesh {
                 of_sphere: order.iter().map(|&v| c.of_sphere[v as usize]).collect(),
             }),
         }
+    }
+
+    /// The power of two below the largest coordinate or radius, by which scaling is exact; 1 where that is zero or
+    /// subnormal.
+    pub fn unit(&self) -> f64 {
+        let sizes = self.spheres.iter().map(|m| m.centre.abs().max_element().max(m.radius));
+        power_of_two_below(sizes.fold(0.0, f64::max))
     }
 
     /// A mesh in input units, in those of the normalised surface.

@@ -188,6 +188,46 @@ fn unusable_tolerances_and_meshes_are_errors() {
     assert!(matches!(union_surface(&MedialMesh::default(), 1.0), Err(ContourError::Union(_))));
 }
 
+/// Faces of tiny coordinates were inside out, since the products of three of them underflow.
+#[test]
+fn a_power_of_two_scales_the_surface_and_the_errors() {
+    let axis = mesh(&[([0.3; 3], 1.0), ([4.0, 0.0, 0.0], 0.5)], &[[0, 1]], &[]);
+    let specks = mesh(&[([0.0; 3], 1e-3), ([1.0, 0.0, 0.0], 1e-3)], &[], &[]);
+    let made = union_surface(&axis, 0.2).unwrap();
+    for exponent in [-1010, -600, -343, 400, 1000] {
+        let unit = 2f64.powi(exponent);
+        let scaled = |mesh: &MedialMesh| mesh.transformed(unit, |p| unit * p);
+        let found = union_surface(&scaled(&axis), 0.2 * unit).unwrap();
+        assert_eq!(found.mesh.faces, made.mesh.faces, "2^{exponent}");
+        assert!(found.mesh.vertices.iter().zip(&made.mesh.vertices).all(|(a, b)| *a == unit * *b));
+        assert_eq!((found.lost, found.smallest), (made.lost, unit * made.smallest));
+        let Err(ContourError::TooThin { smallest, feasible }) =
+            union_surface(&scaled(&specks), unit)
+        else {
+            panic!("specks")
+        };
+        assert!(union_surface(&scaled(&specks), feasible).is_ok(), "2^{exponent}");
+        assert!(smallest > 1e-3 * unit && feasible < 1e-3 * unit, "{smallest:e} {feasible:e}");
+        let fine = union_surface_within(&scaled(&axis), 1e-3 * unit, 50_000);
+        let Err(ContourError::TooFine { tolerance, feasible, .. }) = fine else {
+            panic!("too fine")
+        };
+        assert!(tolerance == 1e-3 * unit && feasible < 10.0 * unit, "{tolerance:e} {feasible:e}");
+    }
+    let below = mesh(&[([0.0; 3], 1e-320)], &[], &[]);
+    assert!(matches!(union_surface(&below, 1e-322), Err(ContourError::NoInside)));
+}
+
+#[test]
+fn unions_that_no_tolerance_shows_are_refused_as_such() {
+    // No tolerance shows balls that are smaller than the finest tetrahedra.
+    let slender = mesh(&[([0.0; 3], 1e-9), ([1.0, 0.0, 0.0], 1e-9)], &[], &[]);
+    for tolerance in [1.0, 0.02, 1e-9] {
+        let error = union_surface(&slender, tolerance);
+        assert!(matches!(error, Err(ContourError::TooSlender { .. })), "{error:?}");
+    }
+}
+
 /// A sphere on a coarse lattice.
 fn lattice_sphere() -> impl Strategy<Value = ([f64; 3], f64)> {
     (prop::array::uniform3(0..4_i32), 1..4_i32)

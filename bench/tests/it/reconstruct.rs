@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::command::{done, folder, json, refused};
+use crate::command::{done, folder, json, refused, run};
 
 /// Checks the output of both methods, and that `medial info` agrees.
 fn check(object: &Value, output: &str, genus: u64) {
@@ -81,6 +81,26 @@ fn the_tolerance_is_as_coarse_as_the_topology_allows() {
     assert!(made("ring.ma", ring) < 0.04);
 }
 
+/// Faces of tiny coordinates were inside out.
+#[test]
+fn the_unit_of_the_coordinates_changes_the_surface_by_its_scale_alone() {
+    let at = folder();
+    let made = |unit: i32| {
+        let v = |x: f64| format!("v {x}e{unit} 0 0 1e{unit}\n");
+        fs::write(at("x.ma"), format!("2 1 0\n{}{}e 0 1\n", v(0.0), v(3.0))).expect("written");
+        let (code, mut object) = json(&["reconstruct", &at("x.ma"), "-o", &at("x.ply")]);
+        assert_eq!((code, &object["warnings"]), (0, &serde_json::json!([])), "{object}");
+        let diagonal = object["diagonal"].as_f64().expect("a number");
+        assert!((diagonal / 33f64.sqrt() / 10f64.powi(unit) - 1.0).abs() < 1e-9, "{object}");
+        let keys = ["vertices", "faces", "closed", "tolerance", "betti", "union_betti"];
+        keys.map(|key| object[key].take())
+    };
+    let expected = made(0);
+    for unit in [-290, -160, -110, 100] {
+        assert_eq!(made(unit), expected, "1e{unit}");
+    }
+}
+
 #[test]
 fn requests_without_a_surface_are_refused() {
     let at = folder();
@@ -91,7 +111,9 @@ fn requests_without_a_surface_are_refused() {
     let ball = write("ball.ma", "1 0 0\nv 0 0 0 1\n");
     let empty = write("empty.ma", "0 0 0\n");
     let points = write("points.ma", "2 1 0\nv 0 0 0 0\nv 1 0 0 0\ne 0 1\n");
-    let specks = write("specks.ma", "2 0 0\nv 0 0 0 1e-6\nv 1 0 0 1e-6\n");
+    let specks = write("specks.ma", "2 0 0\nv 0 0 0 1e-4\nv 1 0 0 1e-4\n");
+    let dust = write("dust.ma", "2 0 0\nv 0 0 0 1e-300\nv 1 0 0 1e-300\n");
+    let below = write("below.ma", "2 0 0\nv 0 0 0 1e-320\nv 1 0 0 1e-320\n");
     let sheet = write(
         "sheet.ma",
         "3 3 1\nv 0 0 0 0\nv 1 0 0 1e-6\nv 0 1 0 0\ne 0 1\ne 1 2\ne 0 2\nf 0 1 2\n",
@@ -102,7 +124,7 @@ fn requests_without_a_surface_are_refused() {
     let mesh = "builtin:sphere:8";
     let crust = ["--method", "power-crust"];
     let crust_of = ["--method", "power-crust", "--mesh", mesh];
-    let cases: [(&[&str], &[&str], i32, &str); 14] = [
+    let cases: [(&[&str], &[&str], i32, &str); 16] = [
         (&[&ball, "-o", "x.stl"], &[], 1, "(found \"stl\", expected one of .ply"),
         (&[&ball, "-o", &nowhere], &[], 1, "the folder does not exist; create it by `mkdir -p"),
         (&["no-such.ma", "-o", &out], &[], 1, "no-such.ma"),
@@ -113,7 +135,14 @@ fn requests_without_a_surface_are_refused() {
         (&[&empty, "-o", &out], &[], 1, "empty.ma"),
         (&[&points, "-o", &out], &[], 1, "points.ma: all spheres have radius zero"),
         (&[&specks, "-o", &out], &[], 1, "specks.ma: every sphere is too thin"),
-        (&[&sheet, "-o", &out], &[], 1, "sheet.ma: every sphere is too thin"),
+        (&[&dust, "-o", &out], &[], 1, "dust.ma: too thin for its extent"),
+        (
+            &[&below, "-o", &out],
+            &[],
+            1,
+            "below.ma: all spheres have radius zero, or below 2.2e-308",
+        ),
+        (&[&sheet, "-o", &out], &[], 1, "sheet.ma: too thin for its extent"),
         (&[&sheet, "-o", &out], &["--tolerance", "1e-5"], 1, "give larger radii"),
         (&[&huge, "-o", &out], &[], 1, "huge.ma"),
         (&[&far, "-o", &out], &crust_of, 1, "far.ma"),
@@ -131,6 +160,30 @@ fn requests_without_a_surface_are_refused() {
         code == 0 && object["warnings"].to_string().contains("check surface and units"),
         "{object}"
     );
+
+    // No tolerance is coarse enough for spheres in other units, and each is refused in these words.
+    let units = write("units.ma", "1 0 0\nv 0 0 0 1000\n");
+    for tolerance in ["0.001", "0.02", "1"] {
+        let words = ["--mesh", mesh, "-o", &out, "--tolerance", tolerance];
+        let no_advice = "no tolerance works; check the units of the medial mesh";
+        refused(&[&["reconstruct", &units][..], &words].concat(), 1, no_advice);
+        let words = ["render", mesh, &units, "--show", "error", "--tolerance", tolerance];
+        refused(&[&words[..], &["-o", &at("x.png")]].concat(), 2, no_advice);
+    }
+    // Advice is enough for the next request.
+    for name in [&ball, &specks, &grown] {
+        let words = ["reconstruct", name, "--mesh", mesh, "-o", &out, "--tolerance"];
+        let mut tolerance = if name == &specks { "1" } else { "1e-7" }.to_owned();
+        for _ in 0..2 {
+            let (code, _, stderr) = run(&[&words[..], &[&*tolerance]].concat());
+            let Some((_, advice)) = stderr.split_once("give a tolerance of ") else {
+                assert_eq!(code, 0, "{stderr}");
+                break;
+            };
+            tolerance = advice.split_whitespace().next().expect("a number").to_owned();
+        }
+        assert_eq!(run(&[&words[..], &[&*tolerance]].concat()).0, 0, "{name}: {tolerance}");
+    }
 
     // A ring with a hole that is much narrower than the tolerance.
     let ring: String = (0..6)
