@@ -212,12 +212,12 @@ pub(super) fn finite(text: &str, field: &str) -> Result<f64, String> {
     number.ok_or_else(|| format!("the {field} {} is not a finite number", quoted(text)))
 }
 
-/// The three counts of a line that is the header of a complex, and whether there is a fourth, of tetrahedra.
-fn counts(line: &Line<'_>) -> Option<([u64; 3], bool)> {
+/// The three counts of a line that is the header of a complex, and a fourth, of tetrahedra.
+fn counts(line: &Line<'_>) -> Option<([u64; 3], Option<u64>)> {
     let words = line.words().rest.map(|word| word.parse().ok());
     match *words.collect::<Option<Vec<u64>>>()?.as_slice() {
-        [spheres, edges, faces] => Some(([spheres, edges, faces], false)),
-        [spheres, edges, faces, _] => Some(([spheres, edges, faces], true)),
+        [spheres, edges, faces] => Some(([spheres, edges, faces], None)),
+        [spheres, edges, faces, cells] => Some(([spheres, edges, faces], Some(cells))),
         _ => None,
     }
 }
@@ -287,11 +287,13 @@ struct Records {
     options: ReadOptions,
     layout: Layout,
     announced: [u64; 3],
-    /// Whether the header has a fourth count, of tetrahedra.
-    four_counts: bool,
+    /// The fourth count of the header, of tetrahedra.
+    announced_cells: Option<u64>,
     spheres: Vec<Sphere>,
     edges: Vec<[u32; 2]>,
     faces: Vec<[u32; 3]>,
+    cells: u64,
+    /// Those that are not marked as deleted.
     tetrahedra: usize,
     normals: usize,
     parts: u64,
@@ -314,12 +316,12 @@ impl Records {
     /// None yet, below the header `line` of a file of `bytes` bytes.
     fn announced(line: &Line<'_>, bytes: usize, options: ReadOptions) -> Result<Self, MaError> {
         let numbers: Vec<Option<u64>> = line.words().rest.map(|word| word.parse().ok()).collect();
-        let (announced, layout, four_counts) = match (counts(line), numbers.as_slice()) {
-            (Some((announced, four_counts)), _) => (announced, Layout::Complex, four_counts),
-            _ if line.words().rest.next() == Some("v") => ([0; 3], Layout::Bare, false),
-            (_, &[Some(n)] | &[Some(4), Some(n)]) => ([n, 0, 0], Layout::Counted, false),
+        let (announced, layout, announced_cells) = match (counts(line), numbers.as_slice()) {
+            (Some((announced, cells)), _) => (announced, Layout::Complex, cells),
+            _ if line.words().rest.next() == Some("v") => ([0; 3], Layout::Bare, None),
+            (_, &[Some(n)] | &[Some(4), Some(n)]) => ([n, 0, 0], Layout::Counted, None),
             (_, &[Some(3), Some(n)]) if options.radii == Radii::NotNeeded => {
-                ([n, 0, 0], Layout::Points, false)
+                ([n, 0, 0], Layout::Points, None)
             }
             (_, &[Some(3), Some(_)]) => return Err(line.malformed(NO_RADII)),
             _ => {
@@ -342,10 +344,11 @@ impl Records {
             options,
             layout,
             announced,
-            four_counts,
+            announced_cells,
             spheres: Vec::with_capacity(spheres),
             edges: Vec::with_capacity(edges),
             faces: Vec::with_capacity(faces),
+            cells: 0,
             tetrahedra: 0,
             normals: 0,
             parts: 0,
@@ -393,8 +396,9 @@ impl Records {
                 self.faces.push(face);
                 FACE
             }
-            "t" if self.four_counts => {
+            "t" if self.announced_cells.is_some() => {
                 self.indices::<4>(&mut words)?;
+                self.cells += 1;
                 self.tetrahedra += usize::from(words.rest.next().is_none_or(|mark| mark == "0"));
                 return Ok(());
             }
@@ -451,7 +455,7 @@ impl Records {
             (FACE, [first, deleted, copies]) => {
                 let are_flags = finite(first, "flag").is_ok() && integer(copies).is_ok();
                 let mark = integer(deleted).ok().filter(|_| are_flags);
-                if self.four_counts {
+                if self.announced_cells.is_some() {
                     return mark.map(|mark| mark != 0.0).ok_or_else(|| not_flags(words));
                 }
                 let mark = mark.filter(|&mark| mark == 0.0 || mark == 1.0);
@@ -538,6 +542,15 @@ impl Records {
                 return Err(MaError { line, ..MaError::of(name, kind) });
             }
         }
+        if let Some(announced) = self.announced_cells.filter(|&count| count != self.cells) {
+            let found = self.cells;
+            let why =
+                format!("the header announces {announced} tetrahedra, the file holds {found}");
+            if !self.options.lenient {
+                return Err(MaError::of(name, MaErrorKind::Malformed(why)));
+            }
+            warnings.push(format!("{why}: taken as they are"));
+        }
         Ok(())
     }
 
@@ -549,7 +562,7 @@ impl Records {
             warnings.push(format!("{many} marks of deletion are negative, for unknown: kept"));
         }
         let unusual = "type, deleted and copies, though the header has three counts";
-        let is_complex = self.layout == Layout::Complex && !self.four_counts;
+        let is_complex = self.layout == Layout::Complex && self.announced_cells.is_none();
         for (kind, words, is_doubtful, read) in [
             (SPHERE, 1, true, "a type, though a mark of deletion usually follows it"),
             (FACE, 2, true, "importance and deleted"),

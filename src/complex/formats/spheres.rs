@@ -251,9 +251,6 @@ fn is_column(field: &str, name: &str) -> bool {
 /// diameter is an error.
 fn columns_of_comments(bytes: &[u8], count: usize) -> Option<Result<[usize; 4], String>> {
     const RADII: [&str; 4] = ["r", "radius", "d", "diameter"];
-    let has = |names: &[&str], columns: &[&str]| {
-        names.iter().any(|name| columns.iter().any(|column| is_column(name, column)))
-    };
     let comments = comments_above(bytes);
     let parts = comments.iter().rev().flat_map(|comment| comment.split(':'));
     let named = parts.filter_map(|part| {
@@ -262,12 +259,23 @@ fn columns_of_comments(bytes: &[u8], count: usize) -> Option<Result<[usize; 4], 
         let words = part.split([' ', '\t', ',', ';']).map(without_unit);
         let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
         [listed, words].into_iter().find_map(|names: Vec<&str>| {
-            // Four words about the radius are prose.
-            let is_header = |run: &&[&str]| match run.len() == names.len() {
-                true => has(run, &["x"]) || is_list && has(run, &RADII),
-                false => ["x", "y", "z"].iter().all(|axis| has(run, &[axis])) && has(run, &RADII),
-            };
-            names.windows(count).find(is_header).map(columns_of)
+            // Of x, y, z and a radius the names up to and with the last one.
+            let mut last = [0; 4];
+            let end = (1..=names.len()).find(|&end| {
+                for (last, kind) in last.iter_mut().zip([&["x"][..], &["y"], &["z"], &RADII]) {
+                    if kind.iter().any(|column| is_column(names[end - 1], column)) {
+                        *last = end;
+                    }
+                }
+                let has = last.map(|last| last + count > end);
+                // Four words about the radius are prose.
+                let is_header = match count == names.len() {
+                    true => has[0] || is_list && has[3],
+                    false => has == [true; 4],
+                };
+                end >= count && is_header
+            });
+            end.map(|end| columns_of(&names[end - count..end]))
         })
     });
     let is_diameter = |comment: &&String| comment.to_ascii_lowercase().contains("diameter");
@@ -448,21 +456,26 @@ fn from_document(document: &Value, name: &str, options: ReadOptions) -> Loaded {
     let mut links = Vec::new();
     collect(document, "", &mut links).map_err(|why| malformed(name, None, why))?;
     let mut loaded = chosen(links, name, options)?;
-    if has_key(document, BUFFER) {
-        loaded.notes.push(format!("{BUFFER} was not added to the radii"));
+    for buffer in BUFFERS.into_iter().filter(|buffer| has_key(document, buffer)) {
+        loaded.notes.push(format!("{buffer} was not added to the radii"));
     }
     Ok(loaded)
 }
 
-/// What cuRobo adds to all radii when it uses a file.
-const BUFFER: &str = "collision_sphere_buffer";
+/// Lengths that cuRobo and Isaac add to all radii, or to those of a link, when they use a file.
+const BUFFERS: [&str; 2] = ["collision_sphere_buffer", "buffer_distance"];
 
-/// Whether some object in a document has a key with another value than zero.
+/// Whether some object in a document has a key with another value than zero, or than zeros by link.
 fn has_key(document: &Value, key: &str) -> bool {
+    let is_zero = |value: &Value| value.as_f64() == Some(0.0);
     match document {
         Value::Array(items) => items.iter().any(|item| has_key(item, key)),
         Value::Object(map) => {
-            map.get(key).is_some_and(|value| value.as_f64() != Some(0.0))
+            let is_none = |value: &Value| match value {
+                Value::Object(links) => links.values().all(is_zero),
+                other => is_zero(other),
+            };
+            map.get(key).is_some_and(|value| !is_none(value))
                 || map.values().any(|value| has_key(value, key))
         }
         _ => false,
@@ -523,7 +536,8 @@ fn link_of<'a>(
 fn is_other_shape(item: &Value) -> bool {
     let kind = ["type", "shape", "kind", "geometry", "class"].iter().find_map(|key| item.get(key));
     if let Some(kind) = kind.and_then(Value::as_str) {
-        return !kind.to_ascii_lowercase().contains("sphere");
+        let kind = kind.to_ascii_lowercase();
+        return !kind.contains("sphere") || ["hemi", "half"].iter().any(|part| kind.contains(part));
     }
     let is_measure = |value: &Value| match value {
         Value::Array(list) => !list.is_empty() && list.iter().all(Value::is_number),
@@ -587,6 +601,14 @@ fn sphere(item: &Value) -> Result<Sphere, String> {
     };
     let [x, y, z] = [number(x, "x")?, number(y, "y")?, number(z, "z")?];
     let radius = number(item.get("radius").ok_or("the radius is missing")?, "radius")?;
+    // Rounded decimals differ slightly. Next to green, `r` is red.
+    let others = [("r", 1.0), ("diameter", 2.0)].into_iter();
+    for (key, factor) in others.filter(|_| item.get("g").is_none()) {
+        let other = item.get(key).and_then(Value::as_f64);
+        if let Some(other) = other.filter(|x| (x - factor * radius).abs() > 0.01 * radius.abs()) {
+            return Err(format!("the radius {radius} contradicts the {key} {other}"));
+        }
+    }
     Ok(Sphere::new(Vec3::new(x, y, z), radius))
 }
 
@@ -597,6 +619,7 @@ fn text(value: &Value) -> String {
 /// Reads the spheres of a URDF or MJCF document; its root element decides.
 pub(super) fn parse_xml(bytes: &[u8], name: &str, options: ReadOptions) -> Loaded {
     let text = str::from_utf8(bytes).map_err(|error| malformed(name, None, error.to_string()))?;
+    check_effort(text).map_err(|(row, why)| malformed(name, Some(row), why))?;
     let document = Document::parse(text).map_err(|error| {
         malformed(name, Some(error.pos().row as usize), parser_message(&error.to_string()))
     })?;
@@ -657,6 +680,46 @@ pub(super) fn parse_xml(bytes: &[u8], name: &str, options: ReadOptions) -> Loade
         links.push(link);
     }
     chosen(links, name, options)
+}
+
+/// Most attributes of one element, and most namespace declarations of a document.
+const MOST_OF_XML: usize = 500;
+
+/// Refuses a document that takes the parser quadratic time: it compares the attributes of an element, and the namespaces
+/// in scope, in pairs. The error has the row.
+fn check_effort(text: &str) -> Result<(), (usize, String)> {
+    let (mut rest, mut declarations) = (text, 0);
+    while let Some(start) = rest.find('<') {
+        rest = &rest[start..];
+        let spans = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")];
+        if let Some((open, close)) = spans.into_iter().find(|(open, _)| rest.starts_with(open)) {
+            let end = rest[open.len()..].find(close).unwrap_or(rest.len() - open.len());
+            rest = &rest[open.len() + end..];
+            continue;
+        }
+        let (mut quote, mut attributes) = (None, 0);
+        let end = rest.find(|c| {
+            match quote {
+                None if c == '"' || c == '\'' => (quote, attributes) = (Some(c), attributes + 1),
+                Some(open) if c == open => quote = None,
+                _ => {}
+            }
+            c == '>' && quote.is_none()
+        });
+        let tag = &rest[1..end.unwrap_or(rest.len())];
+        declarations += tag.matches("xmlns").count();
+        for (count, what) in [(attributes, "attributes"), (declarations, "namespace declarations")]
+        {
+            if count > MOST_OF_XML {
+                let row = 1 + text[..text.len() - rest.len()].matches('\n').count();
+                let element = quoted(tag.split_ascii_whitespace().next().unwrap_or_default());
+                let why = format!("element {element}: more than {MOST_OF_XML} {what}");
+                return Err((row, why));
+            }
+        }
+        rest = &rest[1 + tag.len()..];
+    }
+    Ok(())
 }
 
 fn child<'a, 'i>(parent: Node<'a, 'i>, tag: &str) -> Option<Node<'a, 'i>> {
@@ -804,6 +867,14 @@ mod tests {
         let buffer = "collision_sphere_buffer: 0.01\na: [{center: [0, 0, 0], radius: 1}]\n";
         let notes = load("x.yml", buffer).unwrap().notes;
         assert_eq!(notes, ["collision_sphere_buffer was not added to the radii"]);
+        let xrdf = "collision:\n  geometry: g\n  buffer_distance: {a: 0.0, b: 0.02}\ngeometry:\n  g:\n    spheres:\n      \
+                    a: [{center: [0, 0, 0], radius: 1}]\n";
+        let notes = load("x.xrdf", xrdf).unwrap().notes;
+        assert_eq!(notes, ["buffer_distance was not added to the radii"]);
+        for none in ["0", "{}", "{a: 0, b: 0.0}"] {
+            let xrdf = xrdf.replace("{a: 0.0, b: 0.02}", none);
+            assert_eq!(load("x.xrdf", &xrdf).unwrap().notes, Vec::<String>::new(), "{none}");
+        }
         let urdf = "<!-- x --><robot name='r'><link name='a'><visual><geometry><sphere radius='9'/></geometry></visual>\
                     <collision><geometry><sphere radius='2'/></geometry></collision>\
                     <collision><geometry><box size='1 1 1'/></geometry></collision></link><link name='b'/></robot>";
@@ -847,6 +918,11 @@ mod tests {
             ),
             (
                 "x.json",
+                "[{\"center\": [0, 0, 0], \"radius\": 0.3333, \"r\": 0.3333, \"diameter\": 0.667}]",
+                &[0.3333],
+            ),
+            (
+                "x.json",
                 "[{\"kind\": \"Sphere\", \"center\": [0, 0, 0], \"radius\": 1, \"scale\": 1}]",
                 &[1.0],
             ),
@@ -864,17 +940,55 @@ mod tests {
         }
     }
 
-    /// Quadratic time took a minute.
+    /// In quadratic time this takes a minute.
     #[test]
     fn many_spheres_of_a_robot_are_read_in_linear_time() {
-        let start = std::time::Instant::now();
         let collision = "<collision><geometry><sphere radius='1'/></geometry></collision>\n";
         let urdf = format!("<robot><link>\n{}</link></robot>", collision.repeat(40_000));
         assert_eq!(radii("x.urdf", &urdf).len(), 40_000);
         let geoms = "<geom size='1'/>\n".repeat(40_000);
         let mjcf = format!("<mujoco><worldbody>\n{geoms}</worldbody></mujoco>");
         assert_eq!(radii("x.xml", &mjcf).len(), 40_000);
-        assert!(start.elapsed().as_secs() < 10, "{:?}", start.elapsed());
+    }
+
+    /// The parser compares the attributes of an element, and the namespaces in scope, in pairs.
+    #[test]
+    fn xml_with_too_many_attributes_or_namespaces_is_refused() {
+        let many = |count: u32, name: &str| {
+            (0..count).map(|k| format!(" {name}{k}='u{k}'")).collect::<String>()
+        };
+        let links = |count: u32| {
+            let ball = "<collision><geometry><sphere radius='1'/></geometry></collision>";
+            let link = |k| format!("<link xmlns:q{k}='q{k}'>{ball}</link>\n");
+            (0..count).map(link).collect::<String>()
+        };
+        let attributes = format!("<robot>\n<link/><link{}></link></robot>", many(100_000, "a"));
+        let namespaces = format!("<robot{}>\n{}</robot>", many(2_000, "xmlns:n"), links(2_000));
+        for (text, expected) in [
+            (attributes, "x.urdf, line 2: element \"link\": more than 500 attributes"),
+            (namespaces, "x.urdf, line 1: element \"robot\": more than 500 namespace declarations"),
+            (
+                format!("<robot>\n{}</robot>", links(501)),
+                "x.urdf, line 502: element \"link\": more than 500 namespace declarations",
+            ),
+        ] {
+            assert_eq!(load("x.urdf", &text).unwrap_err().to_string(), expected);
+        }
+        // Comments, character data and values have none.
+        let text = many(2_000, "xmlns:n");
+        let quoted = format!("<!-- <a{text}> --><robot{}>", many(400, "a"));
+        let whole = format!("{quoted}<![CDATA[<a{text}>]]><?p <a{text}>?>{}</robot>", links(1));
+        assert_eq!(radii("x.urdf", &whole), [1.0]);
+    }
+
+    /// In quadratic time this takes minutes.
+    #[test]
+    fn wide_rows_below_a_long_comment_are_read_in_linear_time() {
+        for (extension, separator) in [("csv", ","), ("txt", " "), ("xyzr", " ")] {
+            let [row, words] = [("1", 200_000), ("w", 400_000)]
+                .map(|(word, count)| vec![word; count].join(separator));
+            assert!(load(&format!("x.{extension}"), &format!("# {words}\n{row}\n")).is_err());
+        }
     }
 
     #[test]
@@ -986,6 +1100,9 @@ x.json => {"a": [{"center": [0, 0, 0]}]} => : a, sphere 1: the radius is missing
 x.json => {"a": [{"center": [0, 0], "radius": 1}]} => : a, sphere 1: the center [0,0] is not
 x.json => {"a": [{"center": [0, 0, "0"], "radius": 1}]} => : a, sphere 1: the z "0" is not
 x.json => [{"center": [0, 0, 0], "radius": 1e999}] => , line 1: number out of range
+x.json => [{"center": [0, 0, 0], "radius": 1, "r": 2}] => : sphere 1: the radius 1 contradicts the r 2
+x.json => [{"center": [0, 0, 0], "radius": 1, "diameter": 1}] => : sphere 1: the radius 1 contradicts the diameter 1
+x.json => [{"type": "hemisphere", "center": [0, 0, 0], "radius": 1}] => : no spheres (found 1 other shapes)
 x.json => {"a": [],\n"a": []} => , line 2: duplicate key "a"
 x.json => {"a": {"b": 1, "b": 1}} => , line 1: duplicate key "b"
 x.json => [{"center": [0, 0, 0], "radius": 1, "radius": 2}] => , line 1: duplicate key "radius"

@@ -187,6 +187,7 @@ fn wrong_counts_are_taken_with_a_warning_if_lenient() {
         (PLAIN.replace("3 3 1", "3 1 4000000"), [3, 3, 1]),
         ("5\n0 0 0 1\n1 0 0 1\n".to_owned(), [2, 0, 0]),
         ("1\n0 0 0 1\n1 0 0 1\n".to_owned(), [2, 0, 0]),
+        (PLAIN.replace("3 3 1", "3 3 1 1"), [3, 3, 1]),
     ] {
         assert!(parse_ma(&text, "x.ma", ReadOptions::default()).is_err(), "{text:?}");
         let loaded = parse_ma(&text, "x.ma", LENIENT).unwrap();
@@ -264,6 +265,8 @@ OFF\n => , line 1: expected three counts
 v 0 0 0 1\ne 0 0\n => , line 2: a list of spheres alone
 3 2\n0 0 0\n1 0 0\n => , line 1: points without radii: `--radii surface` takes
 1 0 0\nv 0 0 1\n => , line 2: the radius is missing
+0 0 0 1\n => : the header announces 1 tetrahedra, the file holds 0
+1 0 0 2\nv 0 0 0 1\nt 0 0 0 0\n => : the header announces 2 tetrahedra, the file holds 1
 1 0 0\nv 0 0 zero 1\n => , line 2: the z coordinate "zero" is not a finite number
 1 0 0\nv nan 0 0 1\n => , line 2: the x coordinate "nan"
 1 0 0\nv 0 inf 0 1\n => , line 2: the y coordinate "inf"
@@ -316,6 +319,22 @@ fn errors_name_the_line_and_the_reason() {
         ("vertex 3", "vertex 4", ": line 17: expected vertex 3, found"),
         ("vertex 3", "vertex 4000000000", ": the header announces 4000000000 vertices"),
         ("end_header", "comment", ": line 14: expected a PLY header, found"),
+        (
+            "property double radius",
+            "property list uchar double radius",
+            ": line 7: expected a number as the property radius, found \"list\"",
+        ),
+        (
+            "property int vertex2",
+            "property list uchar int vertex2",
+            ": line 10: expected a number as the property vertex2, found \"list\"",
+        ),
+        (
+            "property list uchar int vertex_indices",
+            "property int vertex_index",
+            ": line 12: expected a list as the property vertex_index, found \"int\"",
+        ),
+        ("element face", "element tristrips", ": PLY triangle strips are not read;"),
         ("3 0 1 2", "4 0 1 2 2", ": line 18: faces must be triangles, found 4 corners"),
         ("3 0 1 2", "3 0 1 3", ": line 18: 3 is not one of the 3 spheres"),
         ("1 0\n3", "1 0.5\n3", ": line 17: 0.5 is not one of the 3 spheres"),
