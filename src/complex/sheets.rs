@@ -161,7 +161,7 @@ impl SheetGraph {
 
     /// The mesh for a picture, and for each of its spheres a place in [`ColourMap::Parts`](crate::ColourMap). Sheets get
     /// separate spheres, so that no colour runs into the next. Seams and curves are edges without a face, junctions
-    /// isolated spheres.
+    /// isolated spheres. Isolated spheres of the mesh have the colours of further sheets.
     ///
     /// # Panics
     /// If the mesh is another one than that of the graph.
@@ -179,6 +179,7 @@ impl SheetGraph {
         }
         copies.extend(lines().flatten().map(|&v| (LINES, v)));
         copies.extend(self.junctions.iter().map(|&v| (JUNCTIONS, v)));
+        copies.extend((self.areas.len() as u32..).zip(mesh.isolated()));
         copies.sort_unstable();
         copies.dedup();
         let copy = |part: u32, v: u32| copies.partition_point(|&other| other < (part, v)) as u32;
@@ -516,6 +517,21 @@ mod tests {
         assert_eq!((painted.faces.len(), painted.lone_edges().len()), (3, 1));
         assert_eq!((painted.spheres.len(), colours.len()), (11, 11));
         assert_eq!(colours.iter().filter(|&&colour| colour == 1.0).count(), 2);
+    }
+
+    #[test]
+    fn isolated_spheres_are_painted_as_parts_of_their_own() {
+        let mut points = THREE[..4].to_vec();
+        points.extend([[0.6, 0.0, 0.3], [0.8, 0.2, 0.3]]);
+        for (faces, spheres) in [(&[[0, 1, 2], [0, 2, 3]][..], 6), (&[], 6)] {
+            let mesh = mesh(&points, &[], faces);
+            let (painted, mut colours) = graph(&mesh).painted(&mesh);
+            assert_eq!((painted.spheres.len(), painted.faces.len()), (spheres, faces.len()));
+            assert_eq!(painted.isolated().len(), mesh.isolated().len());
+            colours.sort_unstable_by(f64::total_cmp);
+            colours.dedup();
+            assert_eq!(colours.len(), mesh.isolated().len() + faces.len().min(1));
+        }
     }
 
     #[test]
