@@ -268,6 +268,8 @@ v 0 0 0\nf 1 1\n => line 2: face 0 has 2 corners; three are the least"#;
 ascii => text => line 2: expected a PLY header, found
 format ascii 1.0\n =>  => line 1: expected a PLY header, found No format line found.
 float z => float w => line 9: expected element vertex with x, y and z before it,
+property float z => property list uchar float z => line 6: expected a number as the property z, found "list"
+property list uchar int vertex_indices => property int vertex_indices => line 8: expected a list as the property vertex_indices, found "int"
 float y => floot y => line 5: expected a PLY header, found
 element face 1 => element face x => line 7: expected a PLY header, found
 element face 1\nproperty list uchar int vertex_indices\n =>  => no face among 3 vertices; a closed surface is needed, not a point set

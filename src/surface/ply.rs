@@ -35,6 +35,15 @@ pub(crate) struct Row {
     pub corners: Vec<u32>,
 }
 
+/// Whether a property of [`Row`] is a number or a list.
+fn kind_of(property: &str) -> Option<&'static str> {
+    match property {
+        "x" | "y" | "z" | "radius" | "r" | "vertex1" | "vertex2" => Some("number"),
+        "vertex_indices" | "vertex_index" => Some("list"),
+        _ => None,
+    }
+}
+
 impl PropertyAccess for Row {
     fn new() -> Self {
         Self::default()
@@ -109,10 +118,19 @@ pub(crate) fn header(bytes: &[u8]) -> Result<Ply<'_>, Fault> {
     let header = Parser::<Row>::new()
         .read_header(&mut reader)
         .map_err(|error| fault(Place::Line(error.line().unwrap_or(1)), "a PLY header", &error))?;
-    // The parser keeps one of several with a name, and would take columns or rows of the others for its.
+    // The parser keeps one of several with a name, and would take columns or rows of the others for its. It takes numbers
+    // for lists and lists for numbers.
     let (mut names, mut element) = (HashSet::new(), None);
     for (row, line) in (1..).zip(head.lines()) {
         let words: Vec<&str> = line.split_whitespace().collect();
+        if let ["property", kind, .., name] = words[..]
+            && ["vertex", "edge", "face"].map(Some).contains(&element)
+            && let Some(expected) =
+                kind_of(name).filter(|expected| (*expected == "list") != (kind == "list"))
+        {
+            let expected = format!("a {expected} as the property {name}");
+            return Err(Fault::Syntax { at: Place::Line(row), expected, found: quoted(kind) });
+        }
         let (name, kind) = match words[..] {
             ["element", name, ..] => {
                 element = Some(name);
@@ -126,6 +144,10 @@ pub(crate) fn header(bytes: &[u8]) -> Result<Ply<'_>, Fault> {
             let name = name.1;
             return Err(Fault::Syntax { at: Place::Line(row), expected, found: quoted(name) });
         }
+    }
+    if header.elements.contains_key("tristrips") {
+        let what = "PLY triangle strips are not read; export faces";
+        return Err(Fault::Unsupported(what.into()));
     }
     let line = reader.line();
     let text = header.encoding == Encoding::Ascii;
@@ -256,10 +278,6 @@ fn fault(at: Place, expected: &str, error: &ParseError) -> Fault {
 pub(super) fn parse(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
     let file = header(bytes)?;
     let vertices = file.count("vertex");
-    if file.elements.iter().any(|element| element.name == "tristrips") {
-        let what = "PLY triangle strips are not read; export the surface as faces";
-        return Err(Fault::Unsupported(what.into()));
-    }
     if ["x", "y", "z"].iter().any(|axis| !file.has("vertex", &[axis])) {
         return Err(missing_in(&file, "element vertex with x, y and z before it"));
     }

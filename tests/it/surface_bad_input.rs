@@ -187,6 +187,11 @@ fn headers_that_promise_too_much_are_errors_and_not_allocations() {
             .replace("element face", &format!("element void {billion}\nelement face"));
         assert!(read(empty.as_bytes(), Format::Ply).is_err());
     }
+    for encoding in ["ascii", "binary_little_endian", "binary_big_endian"] {
+        let list = header(encoding, 0, 0).replace("float z", "list uchar float z");
+        let error = read(list.as_bytes(), Format::Ply).unwrap_err().to_string();
+        assert_eq!(error, "line 6: expected a number as the property z, found \"list\"");
+    }
     let mut list = header("binary_little_endian", 0, 1).replace("uchar", "uint").into_bytes();
     list.extend(u32::MAX.to_le_bytes());
     assert!(read(&list, Format::Ply).is_err());
