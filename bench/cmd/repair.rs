@@ -23,7 +23,7 @@ pub struct Arguments {
     fill_holes: bool,
     /// Replace the surface by a closed one around it, also around an open or non-manifold surface or points
     ///
-    /// ALPHA is a fraction of the bounding box's diagonal, 0.02 by default. Openings narrower than about twice ALPHA and enclosed
+    /// ALPHA is a fraction of the bounding box's diagonal, 0.01 by default. Openings narrower than about twice ALPHA and enclosed
     /// cavities are filled. The vertices of the new surface are ALPHA / 30 away from the input. The number of faces grows with
     /// 1 / ALPHA^2.
     #[arg(long, value_name = "ALPHA", conflicts_with = "fill_holes")]

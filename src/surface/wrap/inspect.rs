@@ -35,9 +35,9 @@ impl WrapOptions {
 }
 
 impl Default for WrapOptions {
-    /// A radius of a fiftieth of the diagonal.
+    /// A radius of a hundredth of the diagonal.
     fn default() -> Self {
-        Self::with_alpha(0.02)
+        Self::with_alpha(0.01)
     }
 }
 
