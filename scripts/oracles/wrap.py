@@ -5,7 +5,7 @@
 MEDIAL is the command, WORK a folder for the CGAL programs and the wraps, A the radius as a fraction of the bounding box's
 diagonal, 0.02 by default; the offset is A / 30. Prints a row for each mesh: vertices of both wraps and their ratio, the
 Hausdorff distance of the wraps as a fraction of alpha, CPU seconds of the wrap by CGAL and of the whole command. Exit codes:
-0 the vertex counts differ by at most 30 % and the Hausdorff distances are at most 2 alpha, 1 otherwise, 77 CGAL is missing
+0 the vertex counts differ by at most 50 % and the Hausdorff distances are at most 3 alpha, 1 otherwise, 77 CGAL is missing
 (Debian: libcgal-dev libgmp-dev libmpfr-dev).
 """
 
@@ -18,9 +18,9 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 # Largest ratio of vertex counts.
-COUNTS = 1.3
+COUNTS = 1.5
 # Largest Hausdorff distance, as a multiple of alpha: an opening of about 2 alpha may be entered by one wrap alone.
-DISTANCE = 2.0
+DISTANCE = 3.0
 
 
 def built(work, name):

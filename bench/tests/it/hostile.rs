@@ -217,8 +217,8 @@ fn surfaces_and_points_that_bound_no_solid_are_wrapped() {
         let [alpha, offset, farthest] =
             ["alpha", "offset", "farthest"].map(|key| repair[key].as_f64().expect("a length"));
         assert!((alpha / offset - 30.0).abs() < 1e-9 && farthest >= 0.98 * offset, "{object}");
-        let text = done(&["info", &wrapped]);
-        assert!(!text.contains("intersect"), "{text}");
+        let (code, found) = json(&["info", &wrapped]);
+        assert_eq!((code, &found["self_intersecting"]), (0, &false.into()), "{found}");
     }
     let (code, object) =
         json(&["repair", &unfit, "--wrap", "0.1", "--components", "largest", "-o", &wrapped]);
