@@ -292,3 +292,50 @@ fn artifacts_that_lead_out_of_a_store_are_not_followed() {
     done(&["report", &store, "--out", &merged]);
     assert!(!Path::new(&merged).join("axes").exists(), "the link was followed");
 }
+
+/// Two boxes of 2 x 2 x 2 that overlap in a corner, as OFF.
+fn overlapping_boxes() -> String {
+    let mut vertices = String::new();
+    let mut faces = String::new();
+    for (first, low) in [(0, 0.0), (8, 1.0)] {
+        for k in 0..8 {
+            let at = |bit: u32| low + 2.0 * f64::from(k >> bit & 1);
+            vertices += &format!("{} {} {}\n", at(0), at(1), at(2));
+        }
+        let sides =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        for [a, b, c, d] in sides.map(|side| side.map(|v| v + first)) {
+            faces += &format!("3 {a} {b} {c}\n3 {a} {c} {d}\n");
+        }
+    }
+    format!("OFF\n16 24 0\n{vertices}{faces}")
+}
+
+#[test]
+fn bodies_that_overlap_are_one_solid_in_every_verb_or_refused_as_they_are() {
+    let at = folder();
+    let (mesh, solid, axis, out) = (at("two.off"), at("one.off"), at("one.ma"), at("out"));
+    fs::write(&mesh, overlapping_boxes()).expect("written");
+    let is_named = |object: &Value| {
+        let warnings = object["warnings"].as_array().expect("a list");
+        warnings.iter().any(|warning| warning.as_str().is_some_and(|text| text.contains("overlap")))
+    };
+    for words in [
+        &["axis", &mesh, "-o", &axis][..],
+        &["simplify", &mesh, "--method", "qmat", "--spheres", "40", "-o", &axis],
+        &["evaluate", &mesh, &axis, "--samples", "500"],
+    ] {
+        let (code, object) = json(words);
+        assert!(code == 0 && is_named(&object), "{object}");
+    }
+    done(&["repair", &mesh, "-o", &solid]);
+    let (_, info) = json(&["info", &solid]);
+    assert_eq!((&info["components"], &info["self_intersecting"]), (&1.into(), &false.into()));
+    // 8 + 8 - 1.
+    assert!((info["volume"].as_f64().expect("closed") - 15.0).abs() < 1e-9, "{info}");
+    let as_is = |words: &[&str]| refused(&[words, &["--as-is"]].concat(), 1, "faces cross");
+    as_is(&["axis", &mesh, "-o", &axis]);
+    as_is(&["simplify", &mesh, "--method", "qmat", "--spheres", "40", "-o", &axis]);
+    as_is(&["compare", &mesh, "--methods", "qmat", "--spheres", "40", "--out", &out]);
+    done(&["axis", &solid, "-o", &axis, "--as-is"]);
+}

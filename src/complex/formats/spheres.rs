@@ -966,7 +966,10 @@ mod tests {
         let namespaces = format!("<robot{}>\n{}</robot>", many(400, "xmlns:n"), links(2_000));
         for (text, expected) in [
             (attributes, "x.urdf, line 2: element \"link\": more than 500 attributes"),
-            (namespaces, "x.urdf, line 102: element \"link\": more than 500 namespace declarations"),
+            (
+                namespaces,
+                "x.urdf, line 102: element \"link\": more than 500 namespace declarations",
+            ),
             (
                 format!("<robot>\n{}</robot>", links(501)),
                 "x.urdf, line 502: element \"link\": more than 500 namespace declarations",
