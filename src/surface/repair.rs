@@ -90,7 +90,7 @@ pub(super) fn weld_within(vertices: &[Vec3], distance: f64) -> Vec<u32> {
     // Adding zero turns -0 into 0.
     let key = |cell: Vec3| cell.to_array().map(|x| (x + 0.0).to_bits());
     let mut kept: HashMap<[u64; 3], Vec<u32>> = HashMap::new();
-    let mut near = |(i, &v): (u32, &Vec3)| {
+    let near = |(i, &v): (u32, &Vec3)| {
         let cell = (v / distance).floor();
         let step = |k: i32| f64::from(k % 3 - 1);
         let around = (0..27).map(|k| key(cell + Vec3::new(step(k), step(k / 3), step(k / 9))));
@@ -101,7 +101,7 @@ pub(super) fn weld_within(vertices: &[Vec3], distance: f64) -> Vec<u32> {
             i
         })
     };
-    (0..).zip(vertices).map(|pair| near(pair)).collect()
+    (0..).zip(vertices).map(near).collect()
 }
 
 /// Treatment of faces with the same corners as an earlier one.

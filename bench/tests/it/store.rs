@@ -406,7 +406,7 @@ fn nothing_outside_of_a_store_is_written_copied_or_removed() {
         let own = format!("{out}/{name}");
         let _ = fs::remove_file(&own).or_else(|_| fs::remove_dir_all(&own));
         std::os::unix::fs::symlink(at("."), &own).expect("linked");
-        refused(&[&words[..], &[&out, "--fresh"]].concat(), 1, "not a regular file, but");
+        refused(&[&words[..], &[&out, "--fresh"]].concat(), 1, "not a regular file, in");
         fs::remove_file(&own).expect("a link");
     }
     let records_of_out = records(&out);
