@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::PI;
 use std::str::FromStr;
 
+use super::mesh::Unit;
+use super::parts::parted;
 use super::report::{Fault, Repair, VertexName};
 use super::soup::PolygonSoup;
 use super::topology::Topology;
@@ -76,7 +78,15 @@ impl Inspection {
 }
 
 fn mended(inspection: Inspection, options: MendOptions) -> Result<Loaded, SurfaceError> {
-    let Inspection { mut mesh, report, refused, .. } = inspection;
+    if options == MendOptions::default() {
+        return inspection.solid();
+    }
+    let Inspection { mesh, report, refused, resolved, .. } = inspection;
+    // What was resolved is closed, and what users of the other verbs see.
+    let (Loaded { mut mesh, report }, refused) = match resolved {
+        Some(solid) => (*solid, None),
+        None => (Loaded { mesh, report }, refused),
+    };
     let mut repairs = report.repairs;
     // The examination of the result repeats its warnings; a failed one has none of the reader.
     let mut warnings = if refused.is_some() { Vec::new() } else { report.warnings };
@@ -375,7 +385,7 @@ fn between(a: Vec3, b: Vec3) -> f64 {
     if a == Vec3::ZERO || b == Vec3::ZERO { PI } else { a.dot(b).clamp(-1.0, 1.0).acos() }
 }
 
-// Parts that touch in a vertex, taken apart; the only repair that moves a vertex.
+// Parts that touch in a vertex or along an edge, taken apart; the only repair that moves a vertex.
 //
 // At such a vertex the faces form several fans. The flattest fan keeps the vertex. Each other one
 // gets a separate vertex, at [`STEP`] of the way to the mean of its rim: towards its own part, so
@@ -394,7 +404,7 @@ type Fan = Vec<usize>;
 /// Gives each fan of faces a separate vertex.
 pub(super) fn separate(vertices: &mut Vec<Vec3>, faces: &mut [[u32; 3]]) -> Option<Repair> {
     let (mut touching, mut largest_move) = (0, 0.0_f64);
-    for (vertex, mut fans) in fans(vertices.len(), faces).into_iter().enumerate() {
+    for (vertex, mut fans) in fans(vertices, faces).into_iter().enumerate() {
         if fans.len() < 2 {
             continue;
         }
@@ -414,10 +424,14 @@ pub(super) fn separate(vertices: &mut Vec<Vec3>, faces: &mut [[u32; 3]]) -> Opti
     (touching > 0).then_some(Repair::SeparatedVertices { vertices: touching, largest_move })
 }
 
-/// For each vertex its fans, by their first corner.
-fn fans(vertices: usize, faces: &[[u32; 3]]) -> Vec<BTreeMap<u32, Fan>> {
-    let fan_of = Topology::new(vertices, faces).fan;
-    let mut fans = vec![BTreeMap::<u32, Fan>::new(); vertices];
+/// For each vertex its fans. Those of parts that touch along an edge count as one where the surface is open there.
+fn fans(vertices: &[Vec3], faces: &[[u32; 3]]) -> Vec<BTreeMap<u32, Fan>> {
+    let points = Unit::of(vertices).forward_all(vertices);
+    let fan_of = match parted(&points, faces) {
+        Some(parted) => parted.faces.as_flattened().to_vec(),
+        None => Topology::new(vertices.len(), faces).fan,
+    };
+    let mut fans = vec![BTreeMap::<u32, Fan>::new(); vertices.len()];
     for ((corner, &vertex), fan) in faces.as_flattened().iter().enumerate().zip(fan_of) {
         fans[vertex as usize].entry(fan).or_default().push(corner);
     }

@@ -20,6 +20,7 @@ mod mend;
 mod mesh;
 mod obj;
 mod off;
+mod parts;
 pub(crate) mod ply;
 mod point_grid;
 mod repair;
@@ -223,6 +224,11 @@ fn inspected(mut soup: soup::PolygonSoup) -> Result<Inspection, Fault> {
     let mut inspection = check::orient_and_examine(repaired);
     if inspection.refused.is_some() || inspection.report.self_intersecting {
         inspection.resolved = solid::resolve(&soup, unit, &inspection).map(Box::new);
+        if inspection.resolved.is_none() && inspection.refused.is_none() {
+            let why = "the intersections were not resolved, so that results may be wrong; wrap the surface (`medial repair \
+                       --wrap`)";
+            inspection.report.warnings.push(why.to_owned());
+        }
     }
     Ok(inspection)
 }

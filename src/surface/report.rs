@@ -281,7 +281,7 @@ pub enum Repair {
     ReorientedFaces { faces: usize },
     /// Parts other than the largest were left out, on demand.
     DroppedComponents { components: usize, faces: usize },
-    /// Parts that touched in a vertex were drawn back from it, on demand.
+    /// Parts that touched in a vertex or along an edge were drawn back from it.
     SeparatedVertices {
         vertices: usize,
         /// The longest way that one was moved, in the unit of the file.
@@ -291,6 +291,8 @@ pub enum Repair {
     WeldedWithin { vertices: usize, distance: f64 },
     /// Faces that crossed, overlapped or touched were replaced by the boundary of the region with a winding number of at least 1.
     ResolvedFaces { faces: usize, by: usize },
+    /// Short edges of the new faces were contracted; no vertex was moved by more than a distance in the unit of the file.
+    ContractedEdges { edges: usize, distance: f64 },
     /// A hole was closed by triangles between its vertices, on demand.
     FilledHole { edges: usize, triangles: usize },
     /// The surface was replaced by one around it, on demand.
@@ -324,6 +326,7 @@ impl Repair {
             self,
             Self::WeldedWithin { .. }
                 | Self::ResolvedFaces { .. }
+                | Self::ContractedEdges { .. }
                 | Self::SeparatedVertices { .. }
                 | Self::FilledHole { .. }
                 | Self::Wrapped { .. }
@@ -344,6 +347,7 @@ impl Repair {
             | Self::DroppedDuplicateFaces { faces }
             | Self::ReorientedFaces { faces } => (faces, "face"),
             Self::TriangulatedPolygons { polygons, .. } => (polygons, "polygon"),
+            Self::ContractedEdges { edges, .. } => (edges, "edge"),
             Self::TurnedOutward { components }
             | Self::TurnedInward { components }
             | Self::DroppedComponents { components, .. } => (components, "component"),
@@ -397,6 +401,9 @@ impl fmt::Display for Repair {
             Self::ResolvedFaces { by, .. } => {
                 let new = counted(by, "face");
                 write!(f, "replaced {what} that cross, overlap or touch by {new} around the solid")
+            }
+            Self::ContractedEdges { distance, .. } => {
+                write!(f, "contracted {what} of the new faces, by {distance:.1e} at most")
             }
             Self::FilledHole { edges, .. } => {
                 write!(f, "filled a hole of {} with {what}", counted(edges, "edge"))

@@ -7,21 +7,26 @@
 //! file.
 //!
 //! 1. *Weld*: vertices at one place; if the surface is open then, the smallest of [`TOLERANCES`] that closes it.
-//! 2. *Orient*: neighbours alike, then every component that encloses a negative volume outward, if it is not a cavity.
+//! 2. *Orient*: bodies that touch are taken apart (`parts.rs`), then turned outward, or inward where they are in an odd number
+//!    of others.
 //! 3. *Resolve*: the winding number. Repeated while rounding makes faces cross.
-//! 4. *Separate*: parts that touch in a vertex.
+//! 4. *Separate*: parts that touch in a vertex or along an edge.
+
+use std::collections::HashSet;
 
 use manifold_rust::manifold::Manifold;
 use manifold_rust::types::{Error, MeshGL64, WindingRule};
 
 use super::check::orient_and_examine;
+use super::intersections::intersections;
 use super::mend::separate;
 use super::mesh::{TriMesh, Unit};
+use super::parts::{Parted, parted, split_at_vertices};
 use super::repair::{Duplicates, Repaired, build, repair, weld_within};
-use super::report::Repair;
+use super::report::{Repair, SurfaceReport};
 use super::soup::PolygonSoup;
-use super::topology::turn_over;
-use super::{Folds, Inspection, Loaded, contract_short_edges};
+use super::topology::{Topology, repairs, shells, turn_over};
+use super::{Contraction, Folds, Inspection, Loaded, contract_short_edges};
 use crate::Vec3;
 
 /// Largest distances of welded vertices, as fractions of the diagonal of the bounding box.
@@ -30,26 +35,41 @@ const TOLERANCES: [f64; 5] = [0.0, 1e-12, 1e-9, 1e-7, 1e-6];
 /// Length below which edges of the result are contracted, as a fraction of the diagonal.
 const SHORT: f64 = 1e-5;
 
-/// Change of the volume by a further pass, as a share, above which the arrangement is taken for wrong.
+/// Change of the volume by those contractions, as a share, above which they are left out.
+const SLIGHT: f64 = 1e-4;
+
+/// Change of the extent, and of the volume by a further pass, as shares, above which an arrangement is taken for wrong.
 const LOSS: f64 = 1e-6;
 
 /// Limit of passes through the arrangement.
 const PASSES: usize = 4;
 
+/// Limit of the pairs of intersecting faces. The arrangement of 86,000 takes ten seconds, of 344,000 a minute.
+const MOST_PAIRS: usize = 100_000;
+
 /// The solid of a closed surface, whose triangles after exact welds are `checked`. None if it is open, or no pass gives a
 /// surface without crossings.
 pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> Option<Loaded> {
-    let diagonal = checked.report.diagonal;
+    let SurfaceReport { diagonal, intersecting_pairs, .. } = checked.report;
+    if intersecting_pairs > MOST_PAIRS {
+        return None;
+    }
     let mut repairs = checked.report.repairs.clone();
-    let mut mesh = match &checked.refused {
-        // Oriented by nesting, it needs no guess.
-        None => checked.mesh.clone(),
-        Some(_) => {
-            let (built, weld) = closed(soup, unit, diagonal)?;
-            repairs.extend(weld);
-            oriented(built)?
-        }
-    };
+    let (built, weld) = closed(soup, unit, diagonal)?;
+    let (mut mesh, turns) = oriented(built)?;
+    // The check dropped walls, and turned faces that it joined in another way.
+    repairs.retain(|repair| {
+        use Repair::{DroppedDuplicateFaces, ReorientedFaces, TurnedInward, TurnedOutward};
+        let is_of_check = matches!(
+            repair,
+            DroppedDuplicateFaces { .. }
+                | ReorientedFaces { .. }
+                | TurnedInward { .. }
+                | TurnedOutward { .. }
+        );
+        !is_of_check
+    });
+    repairs.extend(weld.into_iter().chain(turns));
     let replaced = mesh.faces.len();
     // A weld may have been all that was missing.
     let welded = examined(&mesh)?;
@@ -59,25 +79,38 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
         return Some(Loaded { mesh, report });
     }
     for pass in 0..PASSES {
-        let before = volume(&mesh);
+        let mut edges = 0;
+        let before = volume(&mesh, unit);
         mesh = arranged(&mesh)?;
         // The first pass alone removes overlaps.
-        if pass > 0 && (volume(&mesh) - before).abs() > LOSS * before.abs() {
+        if pass > 0 && (volume(&mesh, unit) - before).abs() > LOSS * before.abs() {
             return None;
         }
-        // Vertices at one place have to be one vertex to be seen as touching parts.
-        let TriMesh { mut vertices, mut faces } = examined(&mesh)?.mesh;
-        let separated = separate(&mut vertices, &mut faces);
-        let mut found = examined(&TriMesh { vertices, faces })?;
+        let mut found = examined(&mesh)?;
+        let mut separated = None;
+        if !is_solid(&found) {
+            let (mut vertices, mut faces) = touching(mesh);
+            separated = separate(&mut vertices, &mut faces);
+            found = examined(&TriMesh { vertices, faces })?;
+        }
         if found.refused.is_none() {
             let limits = vec![SHORT * diagonal; found.mesh.vertices.len()];
-            let contracted = contract_short_edges(&found.mesh, &limits, Folds::Refused);
-            found = examined(&contracted.mesh).filter(is_solid).unwrap_or(found);
+            let Contraction { mesh: shorter, contracted, dropped } =
+                contract_short_edges(&found.mesh, &limits, Folds::Refused);
+            let (all, left) = (volume(&found.mesh, unit), volume(&shorter, unit));
+            // A plate as thin as that must not lose its walls.
+            let is_alike = dropped == 0 && (all - left).abs() <= SLIGHT * all;
+            if let Some(shorter) = examined(&shorter).filter(|found| is_alike && is_solid(found)) {
+                edges = contracted;
+                found = shorter;
+            }
         }
         if is_solid(&found) {
             let Inspection { mesh, mut report, .. } = found;
             repairs.push(Repair::ResolvedFaces { faces: replaced, by: mesh.faces.len() });
             repairs.extend(separated);
+            let distance = SHORT * diagonal;
+            repairs.extend((edges > 0).then_some(Repair::ContractedEdges { edges, distance }));
             report.repairs = repairs;
             return Some(Loaded { mesh, report });
         }
@@ -86,11 +119,21 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
     None
 }
 
-/// The enclosed volume.
-fn volume(mesh: &TriMesh) -> f64 {
-    let origin = mesh.vertices[0];
+/// The vertices and faces of a mesh whose parts share a vertex wherever one touches another with a vertex.
+fn touching(TriMesh { vertices, mut faces }: TriMesh) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let welds = weld_within(&vertices, 0.0);
+    faces.as_flattened_mut().iter_mut().for_each(|v| *v = welds[*v as usize]);
+    faces.retain(|&[a, b, c]| a != b && b != c && c != a);
+    let points = Unit::of(&vertices).forward_all(&vertices);
+    let faces = split_at_vertices(&points, &faces);
+    (vertices, faces)
+}
+
+/// The enclosed volume in scaled units.
+fn volume(mesh: &TriMesh, unit: Unit) -> f64 {
+    let origin = unit.forward(mesh.vertices[0]);
     let of_face = |face| {
-        let [a, b, c] = mesh.triangle(face).map(|p| p - origin);
+        let [a, b, c] = mesh.triangle(face).map(|p| unit.forward(p) - origin);
         a.dot(b.cross(c)) / 6.0
     };
     (0..mesh.faces.len()).map(of_face).sum()
@@ -118,39 +161,67 @@ fn closed(soup: &PolygonSoup, unit: Unit, diagonal: f64) -> Option<(Repaired, Op
     })
 }
 
-/// Faces oriented like their neighbours, and components that are within no other outward. None for one-sided surfaces, which
-/// have no winding number.
-fn oriented(built: Repaired) -> Option<TriMesh> {
-    let Repaired { vertices, mut faces, topology, .. } = built;
-    let turned = topology.turns(&faces).ok()?;
-    turn_over(&mut faces, turned.into_iter());
-    let components = topology.first_face.len();
-    let mut volumes = vec![0.0; components];
-    let mut boxes = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); components];
-    for (face, &component) in faces.iter().zip(&topology.component) {
-        let component = component as usize;
-        let origin = vertices[faces[topology.first_face[component] as usize][0] as usize];
-        let [a, b, c] = face.map(|v| vertices[v as usize]);
-        volumes[component] += (a - origin).dot((b - origin).cross(c - origin));
-        let (low, high) = &mut boxes[component];
-        (*low, *high) = (low.min(a).min(b).min(c), high.max(a).max(b).max(c));
+/// Faces oriented like their neighbours, and bodies outward, or inward where they are cavities; with the repairs. None for
+/// one-sided surfaces, which have no winding number.
+fn oriented(built: Repaired) -> Option<(TriMesh, Vec<Repair>)> {
+    let Repaired { vertices, mut faces, unit, points, .. } = built;
+    let mut repeated = 0;
+    let Parted { faces: apart, vertices: of, turned } = parted(&points, &faces).or_else(|| {
+        let all = faces.len();
+        drop_repeated(&mut faces);
+        repeated = all - faces.len();
+        (repeated > 0).then(|| parted(&points, &faces)).flatten()
+    })?;
+    let points: Vec<Vec3> = of.iter().map(|&v| points[v as usize]).collect();
+    let topology = Topology::new(points.len(), &apart);
+    let found = intersections(&points, &apart, &topology.component);
+    let shells = shells(unit, &points, &apart, &topology, &found).ok()?;
+    let is_wrong = shells.iter().map(|shell| {
+        // One that touches another from inside may be a pocket or a body in it: its orientation decides.
+        shell.touched % 2 == 0 && !shell.is_flat() && !shell.is_right()
+    });
+    let is_wrong: Vec<bool> = is_wrong.collect();
+    let mut repairs = repairs(&turned, &is_wrong, &shells, &topology.component);
+    let dropped = Repair::DroppedDuplicateFaces { faces: repeated };
+    repairs.extend((repeated > 0).then_some(dropped));
+    let of_face = topology.component.iter().map(|&c| is_wrong[c as usize]);
+    turn_over(&mut faces, turned.into_iter().zip(of_face).map(|(turned, wrong)| turned != wrong));
+    let components = shells.iter().filter(|shell| shell.is_flat()).count();
+    if components > 0 {
+        let all = faces.len();
+        let mut of_face = topology.component.iter();
+        faces.retain(|_| of_face.next().is_some_and(|&c| !shells[c as usize].is_flat()));
+        repairs.push(Repair::DroppedComponents { components, faces: all - faces.len() });
     }
-    let is_within = |inner: usize, outer: usize| {
-        let ((low, high), (from, to)) = (boxes[inner], boxes[outer]);
-        inner != outer && low.cmpge(from).all() && high.cmple(to).all()
-    };
-    let is_wrong: Vec<bool> = (0..components)
-        .map(|c| volumes[c] < 0.0 && !(0..components).any(|outer| is_within(c, outer)))
-        .collect();
-    turn_over(&mut faces, topology.component.iter().map(|&c| is_wrong[c as usize]));
-    Some(TriMesh { vertices, faces })
+    Some((TriMesh { vertices, faces }, repairs))
 }
 
-/// The boundary of the region with a winding number of at least 1.
+/// Drops faces with the corners and the orientation of an earlier one.
+fn drop_repeated(faces: &mut Vec<[u32; 3]>) {
+    let mut seen = HashSet::new();
+    faces.retain(|face| {
+        let mut key = *face;
+        let least = (0..3).min_by_key(|&k| face[k]).unwrap_or_default();
+        key.rotate_left(least);
+        seen.insert(key)
+    });
+}
+
+/// The boundary of the region with a winding number of at least 1. None if it does not reach as far as the surface.
 fn arranged(mesh: &TriMesh) -> Option<TriMesh> {
+    let (low, high) = mesh.bounding_box()?;
+    // `manifold-rust` merges what is nearer than a share of the largest coordinate, and multiplies coordinates. The shift is
+    // exact: it is 0 but where all coordinates along an axis are within twice the least of them.
+    let is_far = |axis: usize| {
+        let [near, far] = [low[axis], high[axis]];
+        near * far > 0.0 && near.abs().min(far.abs()) >= 0.5 * near.abs().max(far.abs())
+    };
+    let origin = Vec3::from([0, 1, 2].map(|axis| if is_far(axis) { low[axis] } else { 0.0 }));
+    let shifted: Vec<Vec3> = mesh.vertices.iter().map(|&v| v - origin).collect();
+    let unit = Unit::of(&shifted);
     let input = MeshGL64 {
         num_prop: 3,
-        vert_properties: mesh.vertices.iter().flat_map(|v| v.to_array()).collect(),
+        vert_properties: shifted.iter().flat_map(|&v| unit.forward(v).to_array()).collect(),
         tri_verts: mesh.faces.iter().flatten().map(|&v| v.into()).collect(),
         ..MeshGL64::default()
     };
@@ -161,9 +232,11 @@ fn arranged(mesh: &TriMesh) -> Option<TriMesh> {
     }
     let output = solid.get_mesh_gl64(-1);
     let width = output.num_prop as usize;
-    let position = |row: &[f64]| Vec3::new(row[0], row[1], row[2]);
+    let position = |row: &[f64]| unit.restore(Vec3::new(row[0], row[1], row[2])) + origin;
     let vertices = output.vert_properties.chunks_exact(width).map(position).collect();
     let faces = output.tri_verts.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|v| v as u32));
-    let mesh = TriMesh { vertices, faces: faces.collect() };
-    (!mesh.faces.is_empty()).then_some(mesh)
+    let found = TriMesh { vertices, faces: faces.collect() };
+    let reaches = found.bounding_box()?;
+    let lost = (reaches.0 - low).abs().max((reaches.1 - high).abs()).max_element();
+    (lost <= LOSS * (high - low).max_element()).then_some(found)
 }

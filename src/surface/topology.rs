@@ -67,15 +67,8 @@ impl Topology {
         fans: &mut DisjointSets,
         parts: &mut DisjointSets,
     ) {
-        let mut sides: Vec<(u32, u32, u32)> = (0..3 * faces.len() as u32)
-            .map(|h| {
-                let (a, b) = ends(faces, h);
-                (a.min(b), a.max(b), h)
-            })
-            .collect();
-        sides.sort_unstable();
-        // Sorted by edge, so the half-edges of an edge are neighbours, and "first" means the smallest edge.
-        for group in sides.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)) {
+        // "First" means the smallest edge.
+        for group in sides_by_edge(faces).chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)) {
             let edge = [group[0].0, group[0].1];
             self.edges += 1;
             match *group {
@@ -168,15 +161,26 @@ impl Topology {
     }
 }
 
+/// The ends of every half-edge, ascending, and its number, sorted: those of an edge are neighbours.
+pub(super) fn sides_by_edge(faces: &[[u32; 3]]) -> Vec<(u32, u32, u32)> {
+    let sides = (0..3 * faces.len() as u32).map(|h| {
+        let (a, b) = ends(faces, h);
+        (a.min(b), a.max(b), h)
+    });
+    let mut sides: Vec<_> = sides.collect();
+    sides.sort_unstable();
+    sides
+}
+
 /// Start and end of a half-edge.
-fn ends(faces: &[[u32; 3]], half_edge: u32) -> (u32, u32) {
+pub(super) fn ends(faces: &[[u32; 3]], half_edge: u32) -> (u32, u32) {
     let face = faces[half_edge as usize / 3];
     let k = half_edge as usize % 3;
     (face[k], face[(k + 1) % 3])
 }
 
 /// The corner of the half-edge's face that lies at one of its ends.
-fn corner_at(faces: &[[u32; 3]], half_edge: u32, vertex: u32) -> u32 {
+pub(super) fn corner_at(faces: &[[u32; 3]], half_edge: u32, vertex: u32) -> u32 {
     let start = ends(faces, half_edge).0 == vertex;
     let (face, k) = (half_edge / 3, half_edge % 3);
     if start { half_edge } else { 3 * face + (k + 1) % 3 }
@@ -199,6 +203,8 @@ pub(super) struct Shell {
     pub rounding: f64,
     /// Number of components around it.
     pub depth: usize,
+    /// Number of those that it touches.
+    pub touched: usize,
 }
 
 impl Shell {
@@ -228,9 +234,9 @@ pub(super) fn shells(
 ) -> Result<Vec<Shell>, TooManyNested> {
     let mut shells = volumes(points, faces, topology);
     let parts = Parts { unit, points, faces, component: &topology.component };
-    let depths = depths(&parts, &topology.first_face, &intersections.components)?;
-    for (shell, depth) in shells.iter_mut().zip(depths) {
-        shell.depth = depth;
+    let counts = depths(&parts, &topology.first_face, &intersections.components)?;
+    for (shell, [apart, touched]) in shells.iter_mut().zip(counts) {
+        (shell.depth, shell.touched) = (apart + touched, touched);
     }
     Ok(shells)
 }
@@ -296,6 +302,7 @@ fn volumes(points: &[Vec3], faces: &[[u32; 3]], topology: &Topology) -> Vec<Shel
             // Each determinant is off by at most some 10 roundings of the product of lengths.
             rounding: 16.0 * f64::EPSILON * size / 6.0,
             depth: 0,
+            touched: 0,
         })
         .collect()
 }
@@ -323,20 +330,21 @@ pub(super) struct Parts<'a> {
 #[derive(Debug)]
 pub(super) struct TooManyNested;
 
-/// For each component the number of others it lies in. `meeting` lists the pairs of components
-/// that touch or overlap, sorted.
+/// For each component the number of others it lies in, without those that it touches, and of these. `meeting` lists the
+/// pairs of components that touch or overlap, sorted.
 pub(super) fn depths(
     parts: &Parts<'_>,
     first_face: &[u32],
     meeting: &[[u32; 2]],
-) -> Result<Vec<usize>, TooManyNested> {
-    let mut depths = vec![0; first_face.len()];
-    if depths.len() > 1 {
+) -> Result<Vec<[usize; 2]>, TooManyNested> {
+    let mut apart = vec![0; first_face.len()];
+    let mut touched = apart.clone();
+    if apart.len() > 1 {
         let mut budget = Budget { left: 30_000_000 + 100 * parts.faces.len() };
-        count_separate(parts, first_face, meeting, &mut depths, &mut budget)?;
-        count_touching(parts, meeting, &mut depths, &mut budget)?;
+        count_separate(parts, first_face, meeting, &mut apart, &mut budget)?;
+        count_touching(parts, meeting, &mut touched, &mut budget)?;
     }
-    Ok(depths)
+    Ok(apart.into_iter().zip(touched).map(|(apart, touched)| [apart, touched]).collect())
 }
 
 /// Steps of work that may still be done.

@@ -1,0 +1,228 @@
+//! Bodies of a closed surface that touch along edges, apart from each other.
+//!
+//! Where more than two faces meet in an edge, the surface does not say which of them belong together. A body that is inside
+//! out can be told from one that is not only if it is known as a body, so the faces are joined in pairs:
+//!
+//! 1. Faces that hang together over edges of two faces are a *patch*. In each, the fewer ones follow the others.
+//! 2. Every edge has to be passed as often in one direction as in the other: otherwise nothing says where the solid is.
+//! 3. At an edge, faces of one patch are joined first, then those that are left, in the order in which they lie around the
+//!    edge, found by exact predicates: each with the one that bounds the solid behind it.
+//!
+//! The result does not depend on the order of faces, but for coplanar ones at one edge that are not the same.
+
+use std::cmp::Ordering;
+use std::ops::ControlFlow;
+
+use super::topology::{Topology, corner_at, ends, sides_by_edge, turn_over};
+use crate::Vec3;
+use crate::geometry::predicates::{Sign, orient2d, orient3d, project, projection_axis};
+use crate::geometry::{DisjointSets, TriangleTree};
+
+/// A closed surface with vertices such that every edge has two faces.
+pub(super) struct Parted {
+    pub faces: Vec<[u32; 3]>,
+    /// For each of its vertices the former one.
+    pub vertices: Vec<u32>,
+    /// Whether a face was turned over, by its patch.
+    pub turned: Vec<bool>,
+}
+
+/// The parts of a closed surface. None where it is one-sided, where the directions at an edge do not match, or one of its
+/// faces there has no area.
+pub(super) fn parted(points: &[Vec3], faces: &[[u32; 3]]) -> Option<Parted> {
+    let mut turned = Topology::new(points.len(), faces).turns(faces).ok()?;
+    let mut patches = DisjointSets::singletons(faces.len());
+    for group in sides_by_edge(faces).chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)) {
+        if let &[(.., g), (.., h)] = group {
+            patches.join(g / 3, h / 3);
+        }
+    }
+    let patch: Vec<u32> = (0..faces.len() as u32).map(|face| patches.find(face)).collect();
+    let mut balance = vec![0; faces.len()];
+    for (&patch, &turned) in patch.iter().zip(&turned) {
+        balance[patch as usize] += if turned { 1 } else { -1 };
+    }
+    for (&patch, turned) in patch.iter().zip(&mut turned) {
+        *turned ^= balance[patch as usize] > 0;
+    }
+    let mut faces = faces.to_vec();
+    turn_over(&mut faces, turned.iter().copied());
+
+    let mut fans = DisjointSets::singletons(3 * faces.len());
+    // Turned faces have other half-edges.
+    let sides = sides_by_edge(&faces);
+    for group in sides.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)) {
+        let edge = [group[0].0, group[0].1];
+        let around = Around { points, faces: &faces, patch: &patch, edge };
+        let half_edges: Vec<u32> = group.iter().map(|&(.., h)| h).collect();
+        let opening = half_edges.iter().filter(|&&h| around.opens(h)).count();
+        if 2 * opening != half_edges.len() {
+            return None;
+        }
+        let pairs = match half_edges[..] {
+            [g, h] => vec![[g, h]],
+            _ => around.pairs(&around.sorted(half_edges)?),
+        };
+        for [g, h] in pairs {
+            for vertex in edge {
+                fans.join(corner_at(&faces, g, vertex), corner_at(&faces, h, vertex));
+            }
+        }
+    }
+    let mut number = vec![u32::MAX; 3 * faces.len()];
+    let mut vertices = Vec::new();
+    for (corner, vertex) in (0..).zip(faces.as_flattened_mut()) {
+        let own = &mut number[fans.find(corner) as usize];
+        if *own == u32::MAX {
+            *own = vertices.len() as u32;
+            vertices.push(*vertex);
+        }
+        *vertex = *own;
+    }
+    Some(Parted { faces, vertices, turned })
+}
+
+/// Splits faces at vertices that lie on them, exactly, so that parts that touch there share them.
+pub(super) fn split_at_vertices(points: &[Vec3], faces: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    let corners = |face: [u32; 3]| face.map(|v| points[v as usize]);
+    let tree = TriangleTree::new(0..faces.len() as u32, |face| corners(faces[face as usize]));
+    let mut pieces: Vec<Vec<[u32; 3]>> = faces.iter().map(|&face| vec![face]).collect();
+    let mut used = faces.as_flattened().to_vec();
+    used.sort_unstable();
+    used.dedup();
+    for vertex in used {
+        let p = points[vertex as usize];
+        tree.overlapping([p; 3], |face, triangle| {
+            if !faces[face as usize].contains(&vertex) && holds(triangle, p) {
+                let pieces = &mut pieces[face as usize];
+                let split = std::mem::take(pieces).into_iter().flat_map(|[a, b, c]| {
+                    if !holds(corners([a, b, c]), p) {
+                        return vec![[a, b, c]];
+                    }
+                    let around = [[a, b, vertex], [b, c, vertex], [c, a, vertex]].into_iter();
+                    around.filter(|&piece| projection_axis(corners(piece)).is_some()).collect()
+                });
+                *pieces = split.collect();
+            }
+            ControlFlow::Continue(())
+        });
+    }
+    pieces.concat()
+}
+
+/// Whether a point lies in a triangle or on its border.
+fn holds([a, b, c]: [Vec3; 3], p: Vec3) -> bool {
+    if !orient3d(a, b, c, p).is_zero() {
+        return false;
+    }
+    let Some((axis, turn)) = projection_axis([a, b, c]) else { return false };
+    let [a, b, c, p] = [a, b, c, p].map(|q| project(q, axis));
+    [[a, b], [b, c], [c, a]].into_iter().all(|[from, to]| {
+        let side = orient2d(from, to, p);
+        side == turn || side.is_zero()
+    })
+}
+
+/// The faces around an edge, by their half-edges there.
+struct Around<'a> {
+    points: &'a [Vec3],
+    faces: &'a [[u32; 3]],
+    /// Of each face.
+    patch: &'a [u32],
+    /// Ascending.
+    edge: [u32; 2],
+}
+
+impl Around<'_> {
+    /// The corner across from the edge.
+    fn tip(&self, half_edge: u32) -> Vec3 {
+        let face = self.faces[half_edge as usize / 3];
+        self.points[face[(half_edge as usize + 2) % 3] as usize]
+    }
+
+    fn ends(&self) -> [Vec3; 2] {
+        self.edge.map(|v| self.points[v as usize])
+    }
+
+    /// Whether the solid is behind the face towards larger angles: its faces look outward, and the half-edge goes down.
+    fn opens(&self, half_edge: u32) -> bool {
+        ends(self.faces, half_edge).0 == self.edge[1]
+    }
+
+    /// Counter-clockwise around the edge, from the first one. Of faces at one angle, those with the solid behind them at
+    /// smaller angles come first.
+    fn sorted(&self, mut group: Vec<u32>) -> Option<Vec<u32>> {
+        let [a, b] = self.ends();
+        let first = self.tip(group[0]);
+        if group.iter().any(|&h| projection_axis([a, b, self.tip(h)]).is_none()) {
+            return None;
+        }
+        let (axis, turn) = projection_axis([a, b, first])?;
+        let turn_to = |p: Vec3| {
+            let [a, b, p] = [a, b, p].map(|q| project(q, axis));
+            orient2d(a, b, p)
+        };
+        // 0 at the angle of the first face, then the half turn after it, its opposite, and the other half turn.
+        let sector = |p: Vec3| match orient3d(a, b, first, p) {
+            Sign::Positive => 1,
+            Sign::Negative => 3,
+            Sign::Zero if turn_to(p) == turn => 0,
+            Sign::Zero => 2,
+        };
+        let by_angle = |p: Vec3, q: Vec3| {
+            let (of_p, of_q) = (sector(p), sector(q));
+            of_p.cmp(&of_q).then_with(|| match orient3d(a, b, p, q) {
+                Sign::Positive if of_p % 2 == 1 => Ordering::Less,
+                Sign::Negative if of_p % 2 == 1 => Ordering::Greater,
+                _ => Ordering::Equal,
+            })
+        };
+        // Patches at one place and of one direction bound nothing between them: any order does that is the same at all
+        // of their edges, seen from behind.
+        let among_equal = |h: u32| {
+            let patch = self.patch_of(h);
+            if self.opens(h) { (true, u32::MAX - patch) } else { (false, patch) }
+        };
+        group.sort_by(|&g, &h| {
+            by_angle(self.tip(g), self.tip(h)).then(among_equal(g).cmp(&among_equal(h)))
+        });
+        Some(group)
+    }
+
+    fn patch_of(&self, half_edge: u32) -> u32 {
+        self.patch[half_edge as usize / 3]
+    }
+
+    /// The half-edges that are joined, from their order around the edge.
+    fn pairs(&self, sorted: &[u32]) -> Vec<[u32; 2]> {
+        let mut patches: Vec<u32> = sorted.iter().map(|&h| self.patch_of(h)).collect();
+        patches.sort_unstable();
+        patches.dedup();
+        let mut pairs = Vec::new();
+        for patch in patches {
+            let own = sorted.iter().copied().filter(|&h| self.patch_of(h) == patch);
+            pairs.extend(self.nested(&own.collect::<Vec<u32>>()));
+        }
+        let joined: &[u32] = pairs.as_flattened();
+        let left: Vec<u32> = sorted.iter().copied().filter(|h| !joined.contains(h)).collect();
+        pairs.extend(self.nested(&left));
+        pairs
+    }
+
+    /// Pairs with the solid between them, like brackets in a ring; those without a partner are left out.
+    fn nested(&self, sorted: &[u32]) -> Vec<[u32; 2]> {
+        let mut pairs: Vec<[u32; 2]> = Vec::new();
+        let mut open = Vec::new();
+        // Twice around: the first faces may close what the last ones opened.
+        for (k, &h) in sorted.iter().chain(sorted).enumerate() {
+            if self.opens(h) {
+                open.extend((k < sorted.len()).then_some(h));
+            } else if pairs.iter().all(|pair| pair[1] != h)
+                && let Some(other) = open.pop()
+            {
+                pairs.push([other, h]);
+            }
+        }
+        pairs
+    }
+}
