@@ -707,8 +707,7 @@ impl Within<'_> {
         // The state, and the count and measured error of it and of the largest count that missed the bound.
         let (mut within, mut held, mut missed) = (None, None, None::<(usize, f64)>);
         let (mut trials, mut misses) = (0, 0);
-        // The mesh of fewest spheres within the bound: the next trials continue from it. Without rounds, far within the
-        // bound, it does so up to the first miss: it can miss a bound that another mesh of its size meets.
+        // The mesh of fewest spheres within the bound.
         let mut smallest: Option<MedialMesh> = None;
         loop {
             let count = wanted;
@@ -724,17 +723,12 @@ impl Within<'_> {
             least = least.min(state.error);
             if state.error <= bound {
                 if held.is_none_or(|(spheres, _)| now.0 < spheres) {
-                    if missed.is_none() || !is_far(bound, now.1) {
-                        smallest = Some(state.mesh.clone());
-                    }
+                    smallest = Some(state.mesh.clone());
                     (within, held) = (Some(state), Some(now));
                 }
                 misses = 0;
             } else if missed.is_none_or(|(spheres, _)| spheres < now.0) {
                 missed = Some((now.0, now.1.max(state.error)));
-                if held.is_some_and(|(_, error)| is_far(bound, error)) {
-                    smallest = None;
-                }
                 misses += 1;
             }
             wanted = match (held, missed) {
@@ -814,8 +808,8 @@ impl Within<'_> {
         }
     }
 
-    /// The state of a number of spheres: from `smallest` if that has as many, or the last mesh with [`MANY`] times as
-    /// many. Without rounds where the error is far from the bound.
+    /// The state of a number of spheres, from `smallest` or the last mesh with [`MANY`] times as many, whichever
+    /// collapses to the smaller error. Without rounds where that error is far from the bound.
     fn with(
         &self,
         meshes: &[(MedialMesh, f64)],
@@ -823,20 +817,37 @@ impl Within<'_> {
         count: usize,
     ) -> Result<State> {
         let Self { goal, params, run, .. } = *self;
-        // The last passes are careful and with witnesses, as those to a given number of spheres.
         let enough = meshes.iter().rev().find(|(mesh, _)| mesh.spheres.len() >= MANY * count);
-        let smallest = smallest.filter(|mesh| mesh.spheres.len() >= count);
-        let mesh = smallest.unwrap_or(&enough.unwrap_or(&meshes[0]).0);
-        let descent = Descent::new(goal, goal.points(count), mesh.clone())?;
-        let mut witnesses = Witnesses::new(goal)?;
-        let mut descent = reduced(descent, count, &mut witnesses, run)?;
-        let error = witnesses.join(&mut descent, f64::INFINITY)?;
+        let (mesh, _) = enough.unwrap_or(&meshes[0]);
+        let (mut descent, mut witnesses, mut error) = self.collapsed(mesh, count)?;
+        // Either way can end in a bad state of a flat solid, whose errors fall in steps.
+        if let Some(mesh) = smallest.filter(|mesh| mesh.spheres.len() >= count) {
+            let other = self.collapsed(mesh, count)?;
+            if other.2 < error {
+                (descent, witnesses, error) = other;
+            }
+        }
         if error < NEAR[0] * self.bound || error > FAR * NEAR[1] * self.bound {
             return Ok(State { mesh: descent.mesh, error });
         }
         let descent = swapped_often(descent, &mut witnesses, run)?;
         let polish = Polish { goal, params, run, swaps: true, bound: Some(self.bound) };
         polish.run(descent, witnesses, &mut Diagnostics::default())
+    }
+
+    /// A mesh collapsed to a number of spheres, with its measured error. The last passes are careful and with witnesses, as
+    /// those to a given number of spheres.
+    fn collapsed(
+        &self,
+        mesh: &MedialMesh,
+        count: usize,
+    ) -> Result<(Descent<'_>, Witnesses<'_>, f64)> {
+        let Self { goal, run, .. } = *self;
+        let descent = Descent::new(goal, goal.points(count), mesh.clone())?;
+        let mut witnesses = Witnesses::new(goal)?;
+        let mut descent = reduced(descent, count, &mut witnesses, run)?;
+        let error = witnesses.join(&mut descent, f64::INFINITY)?;
+        Ok((descent, witnesses, error))
     }
 }
 
