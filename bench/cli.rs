@@ -149,71 +149,7 @@ const GROUPS: [(&str, &[&str]); 4] = [
 ];
 
 /// Examples at the end of the help: of the command for all verbs, then of each verb.
-const EXAMPLES: &str = "
-medial
-  medial compare
-  medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma
-  medial evaluate builtin:blob blob.ma
-compare
-  medial compare
-  medial compare builtin:torus --methods qmat,hem --spheres 200,50
-  medial compare --methods qmat:k=0 --against 2027.1 --out k-is-0
-check
-  medial check qmat
-  medial check qmat --set k=0 --timeout 60
-methods
-  medial methods
-  medial methods qmat
-  medial methods --json
-simplify
-  medial simplify builtin:blob --spheres 100 -o blob.ma
-  medial simplify builtin:blob --method qmat --max-error 0.01 -o blob.ma
-  medial simplify builtin:blob --method angle --level 60 -o blob.glb
-axis
-  medial axis builtin:blob -o blob.ma
-  medial axis builtin:blob --dual delaunay --json
-evaluate
-  medial axis builtin:blob -o blob.ma
-  medial evaluate builtin:blob blob.ma
-  medial evaluate builtin:blob blob.ma --against 2027.1
-render
-  medial render builtin:bracket -o bracket.png
-  medial axis builtin:blob -o blob.ma
-  medial render builtin:blob blob.ma --show error -o blob.png
-view
-  medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma
-  medial view blob.ma --mesh builtin:blob -o blob.html
-reconstruct
-  medial simplify builtin:blob --method qmat --spheres 100 -o blob.ma
-  medial reconstruct blob.ma --mesh builtin:blob -o blob.ply
-  medial reconstruct --method power-crust --mesh builtin:blob -o crust.ply
-info
-  medial info builtin:torus
-  medial info builtin:torus --json
-repair
-  medial datasets make torus -o torus.off
-  medial repair torus.off --fill-holes -o repaired.off
-  medial repair torus.off --components largest -o largest.ply
-convert
-  medial axis builtin:blob -o blob.ma
-  medial convert blob.ma blob.vtp
-  medial convert blob.ma blob.glb --color error --mesh builtin:blob
-datasets
-  medial datasets list
-  medial datasets make torus -o torus.off
-  medial datasets fetch small
-report
-  medial compare --methods qmat --out qmat
-  medial compare --methods hem --out hem
-  medial report qmat hem --out merged
-diff
-  medial compare --methods qmat --out old
-  medial compare --methods qmat --out new
-  medial diff old new
-history
-  medial compare --methods qmat --out today
-  medial history runs --add today --commit 1a2b3c4d --date 2026-01-31
-";
+const EXAMPLES: &str = include_str!("examples.txt");
 
 /// The examples of a verb, or of the command, as they are shown.
 fn examples(name: &str) -> String {
@@ -263,7 +199,7 @@ fn run(verb: Verb, global: &Global, registry: &mut Registry) -> Result<Exit, Fai
         Verb::Info(arguments) => cmd::info::run(&arguments, global),
         Verb::Axis(arguments) => cmd::axis::run(&arguments, global),
         Verb::Simplify(arguments) => cmd::simplify::run(&arguments, global, registry),
-        Verb::Evaluate(arguments) => cmd::evaluate::run(&arguments, global, registry),
+        Verb::Evaluate(arguments) => cmd::evaluate::run(&arguments, global),
         Verb::Reconstruct(arguments) => cmd::reconstruct::run(&arguments, global),
         Verb::Render(arguments) => cmd::render::run(&arguments, global),
         Verb::View(arguments) => cmd::view::run(&arguments, global),

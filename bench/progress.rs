@@ -5,9 +5,8 @@ use std::io::{self, IsTerminal, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use medial::simplifier::Progress as Steps;
-use medial_methods::usual_seconds;
 use medial_run::text::printable;
 
 /// Interval between updates of a line.
@@ -24,54 +23,42 @@ pub struct Progress {
     is_quiet: bool,
     begun: usize,
     total: usize,
-    jobs: usize,
-    /// The methods of the remaining turns.
-    ahead: Vec<String>,
-    /// The methods of the finished turns, with the seconds of each.
-    seen: Vec<(String, f64)>,
 }
 
 impl Progress {
-    /// Progress through a turn of each of these methods, of which `jobs` run at the same time.
-    pub fn new(is_quiet: bool, turns: Vec<&str>, jobs: usize) -> Self {
+    /// Progress through a number of turns of methods.
+    pub fn new(is_quiet: bool, total: usize) -> Self {
         // In a log file a bar would be one long line of control characters.
         let is_drawn = !is_quiet && io::stderr().is_terminal();
-        let bar = is_drawn.then(|| ProgressBar::new(turns.len() as u64));
+        let bar = is_drawn.then(|| ProgressBar::new(total as u64));
         if let Some(bar) = &bar {
-            let style = ProgressStyle::with_template("{bar:30} {pos}/{len}  {elapsed}  {msg}");
+            let line = "{bar:30} {pos}/{len}  {elapsed}, about {eta} left  {msg}";
+            let style = ProgressStyle::with_template(line);
             bar.set_style(style.unwrap_or(ProgressStyle::default_bar()));
             bar.enable_steady_tick(INTERVAL);
         }
-        let ahead: Vec<String> = turns.into_iter().map(str::to_owned).collect();
-        Self { bar, is_quiet, begun: 0, total: ahead.len(), jobs, ahead, seen: Vec::new() }
+        Self { bar, is_quiet, begun: 0, total }
     }
 
     /// Shows the current mesh and method, and the number of the repetition among `of`.
     pub fn at(&mut self, mesh: &str, method: &str, [turn, of]: [usize; 2]) {
-        let left = estimate(&self.seen, &self.ahead).map_or_else(String::new, |seconds| {
-            let left = Duration::from_secs((seconds / self.jobs as f64).ceil() as u64);
-            format!(", about {} left", HumanDuration(left))
-        });
         self.begun += 1;
         match &self.bar {
             Some(bar) => {
                 let turn =
                     if of > 1 { format!(", repetition {turn} of {of}") } else { String::new() };
-                bar.set_message(printable(&format!("{mesh}: {method}{turn}{left}")));
+                bar.set_message(printable(&format!("{mesh}: {method}{turn}")));
             }
             // One line for each mesh and method.
             None if turn == 1 && !self.is_quiet => {
-                self.remark(&format!("[{}/{}] {mesh}: {method}{left}", self.begun, self.total));
+                self.remark(&format!("[{}/{}] {mesh}: {method}", self.begun, self.total));
             }
             None => {}
         }
     }
 
-    /// A turn of a method is done, after some seconds.
-    pub fn done(&mut self, method: &str, seconds: f64) {
-        if let Some(place) = self.ahead.iter().position(|ahead| ahead == method) {
-            self.seen.push((self.ahead.remove(place), seconds));
-        }
+    /// A turn of a method is done.
+    pub fn done(&self) {
         self.bar.iter().for_each(|bar| bar.inc(1));
     }
 
@@ -84,23 +71,6 @@ impl Progress {
             }
         }
     }
-}
-
-/// Usual seconds of a method from elsewhere: about the mean of ours.
-const ELSEWHERE: f64 = 5.0;
-
-/// Seconds of the turns ahead: for each the mean of its method so far, or what it usually takes in proportion to the
-/// methods so far. `None` before the first turn is done.
-fn estimate(seen: &[(String, f64)], ahead: &[String]) -> Option<f64> {
-    let seconds: f64 = seen.iter().map(|(_, seconds)| seconds).sum();
-    let usual = |id: &str| usual_seconds(id).unwrap_or(ELSEWHERE);
-    let slowness = seconds / seen.iter().map(|(method, _)| usual(method)).sum::<f64>();
-    let turn = |method: &String| {
-        let own = seen.iter().filter(|(id, _)| id == method).map(|(_, seconds)| *seconds);
-        let (number, sum) = own.fold((0.0, 0.0), |(number, sum), s| (number + 1.0, sum + s));
-        if number > 0.0 { sum / number } else { slowness * usual(method) }
-    };
-    (!seen.is_empty()).then(|| ahead.iter().map(turn).sum())
 }
 
 impl Drop for Progress {
@@ -174,19 +144,6 @@ fn text(stage: &str, elapsed: Duration, done: u64, total: Option<u64>) -> String
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn turns_ahead_take_as_long_as_those_of_their_method() {
-        let text = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect::<Vec<_>>();
-        let seen = [("qmat".to_owned(), 1.0), ("aof".to_owned(), 20.0), ("qmat".to_owned(), 3.0)];
-        assert_eq!(estimate(&seen[..0], &text(&["qmat"])), None);
-        assert_eq!(estimate(&seen, &text(&["qmat", "aof", "aof"])), Some(42.0));
-        let hem = estimate(&seen, &text(&["hem"])).unwrap();
-        let share = usual_seconds("hem").unwrap()
-            / (2.0 * usual_seconds("qmat").unwrap() + usual_seconds("aof").unwrap());
-        assert!((hem - 24.0 * share).abs() < 1e-9, "{hem}");
-        assert_eq!(estimate(&[("theirs".to_owned(), 5.0)], &text(&["others"])), Some(5.0));
-    }
 
     #[test]
     fn only_stages_that_last_are_shown() {

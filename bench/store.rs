@@ -21,8 +21,6 @@ use crate::exit::Failure;
 pub const RESULTS: &str = "results.jsonl";
 /// Name of the folder of the results as `.ma`.
 pub const AXES: &str = "axes";
-/// Folder of the requests that ended their workers.
-pub const AGAIN: &str = "again";
 /// Name of the page of a report.
 pub const PAGE: &str = "index.html";
 /// Name of the file that names the process that holds a store.
@@ -32,7 +30,7 @@ const HOLDER: &str = "process ";
 /// Names in the folder itself that are written or removed.
 const FILES: [&str; 6] = [LOCK, RESULTS, PAGE, "header.json", "study.toml", "results.csv"];
 /// Names of the folders in it that belong to this program.
-const FOLDERS: [&str; 6] = [AGAIN, AXES, "pictures", "plots", "tables", "views"];
+const FOLDERS: [&str; 5] = [AXES, "pictures", "plots", "tables", "views"];
 
 /// A folder of results that this process may add to.
 pub struct Store {
@@ -92,6 +90,11 @@ impl Store {
         self.known.clear();
         self.journal = Journal::open(self.dir.join(journal))?;
         Ok(())
+    }
+
+    /// Removes the page, which another report replaces.
+    pub fn remove_page(&self) -> Result<(), Failure> {
+        remove(&self.dir.join(PAGE))
     }
 
     /// The levels of an item to run: levels without a record or without their medial mesh, levels that a limit ended or

@@ -159,22 +159,11 @@ const SECONDS: [(&str, f64); 15] = [
     ("tight", 26.0),
 ];
 
-/// The place of a method in [`SECONDS`], for a chain (`FIRST+THEN`) that of its dearer part.
-fn place(id: &str) -> Option<usize> {
-    let places = id.split('+').map(|part| SECONDS.iter().position(|&(known, _)| known == part));
-    places.max_by_key(|place| place.unwrap_or(SECONDS.len())).flatten()
-}
-
 /// The place of a method from cheap to dear: comparisons run in this order. A chain costs as much as its
 /// dearer part; methods from elsewhere come last.
 pub fn cost_rank(id: &str) -> usize {
-    place(id).unwrap_or(SECONDS.len())
-}
-
-/// The seconds that a method takes on a mesh of some 10,000 vertices, in proportion to others; `None` for methods
-/// from elsewhere.
-pub fn usual_seconds(id: &str) -> Option<f64> {
-    place(id).map(|place| SECONDS[place].1)
+    let place = |part: &str| SECONDS.iter().position(|&(known, _)| known == part);
+    id.split('+').filter_map(place).max().unwrap_or(SECONDS.len())
 }
 
 /// The method with an id, or `None`. [`initial`] simplifies nothing and is not among them.
@@ -220,7 +209,7 @@ mod tests {
     use std::fs;
     use std::path::Path;
 
-    use super::{Registered, SECONDS, cost_rank, registry, usual_seconds, version};
+    use super::{Registered, SECONDS, cost_rank, registry, version};
 
     #[path = "../build.rs"]
     mod build;
@@ -279,11 +268,10 @@ mod tests {
     #[test]
     fn every_method_has_a_cost() {
         for Registered { method, .. } in registry() {
-            assert!(usual_seconds(&method.info().id).is_some(), "{}", method.info().id);
+            assert!(cost_rank(&method.info().id) < SECONDS.len(), "{}", method.info().id);
         }
         assert_eq!(cost_rank("angle+hem"), cost_rank("hem"));
         assert!(cost_rank("qmat") < cost_rank("hem") && cost_rank("hem") < cost_rank("theirs"));
-        assert_eq!(usual_seconds("theirs"), None);
         assert!(SECONDS[1..].is_sorted_by(|(_, a), (_, b)| a <= b), "after the start");
     }
 

@@ -4,8 +4,6 @@
 //! the meshes that it ran on, where a missing result counts as infinite. The ratio to the runner-up is over the
 //! meshes where both have a result. A further method changes these numbers only if it becomes first or second.
 //! Whether a difference is established also depends on the number of methods, for whose pairs the test is corrected.
-//!
-//! The best median and the most results may belong to different methods. Then both are named.
 
 use std::cmp::Ordering;
 
@@ -38,16 +36,13 @@ const RANKED: f64 = 5.0;
 /// The quantity of the criterion whose values are in the column of the time.
 const TIME: &str = "its time";
 
-/// The end of the title of a row that is ranked by the number of meshes with a result.
-const MOST_MESHES: &str = ", on the most meshes";
-
 /// For each mesh the least value of a method; `None` where the method did not run.
 pub(crate) type Values = Vec<Option<Found>>;
 
 /// A value and the seconds of the result that has it; infinite and unknown without a result.
 #[derive(Clone, Copy)]
 pub(crate) struct Found {
-    pub(crate) value: f64,
+    value: f64,
     seconds: f64,
 }
 
@@ -98,9 +93,8 @@ pub(crate) fn purpose_table(
     let established = "A difference is established if the signed-rank test over meshes, corrected for all pairs of \
          methods, has p < 0.05.";
     let medians = "Medians over the meshes that a method ran on. A missing result counts as infinite. A method needs \
-         results on at least half of its meshes. If another method has results on more meshes, it is named, too. The \
-         ratio to the runner-up is a geometric mean over the meshes where both have a result, with its 95 % interval \
-         if they are at least six. ";
+         results on at least half of its meshes. The ratio to the runner-up is a geometric mean over the meshes where \
+         both have a result, with its 95 % interval if they are at least six. ";
     let medians = medians.to_owned() + if has_few { &few } else { established };
     let notes = [how.to_owned(), rule].into_iter().chain((!is_one).then_some(medians));
     let columns = [
@@ -140,30 +134,34 @@ fn at_count(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Ve
         text: |value| format!("least angle {:.1}°", 60.0 - value),
         of: "its distance from 60°",
     };
-    let mut rows: Vec<Vec<Cell>> = rows_of(comparison, &error);
+    let mut rows: Vec<Vec<Cell>> = criterion_row(comparison, &error).into_iter().collect();
     rows.push(right_everywhere(comparison, level, &spheres));
-    rows.extend(rows_of(comparison, &triangles));
+    rows.extend(criterion_row(comparison, &triangles));
     rows
 }
 
-/// The rows of the medial mesh nearest to the axis that the surface implies, both ways.
-fn closest_structure(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Vec<Cell>> {
+/// The row of the medial mesh nearest to the axis that the surface implies, both ways.
+fn closest_structure(
+    comparison: &Comparison<'_>,
+    level: usize,
+    spheres: usize,
+) -> Option<Vec<Cell>> {
     let values = values(comparison, Some(level), |entry| {
         HAUSDORFF.of(entry.record).filter(|&e| entry.comparable() && e <= RANKED)?;
         Some(COMPLETENESS.of(entry.record)?.max(CENTRALITY.of(entry.record)?))
     });
     let title = format!("closest structure at {}", counted(spheres, "sphere", "spheres"));
     let text = |value| format!("axis missed and off centre {} %", significant(value, 3));
-    rows_of(comparison, &Criterion { title, values, text, of: "its distance" })
+    criterion_row(comparison, &Criterion { title, values, text, of: "its distance" })
 }
 
-/// The rows of the lowest error among the meshes of a group.
+/// The row of the lowest error among the meshes of a group.
 fn in_group(
     comparison: &Comparison<'_>,
     level: usize,
     spheres: usize,
     (name, meshes): (&str, &[String]),
-) -> Vec<Vec<Cell>> {
+) -> Option<Vec<Cell>> {
     let mut values = errors_at(comparison, level);
     for own in &mut values {
         for (mesh, found) in comparison.meshes.iter().zip(own) {
@@ -171,7 +169,7 @@ fn in_group(
         }
     }
     let title = format!("{name}: lowest error at {}", counted(spheres, "sphere", "spheres"));
-    rows_of(comparison, &error_criterion(values, title))
+    criterion_row(comparison, &error_criterion(values, title))
 }
 
 fn error_criterion(values: Vec<Values>, title: String) -> Criterion {
@@ -209,7 +207,7 @@ fn within_bound(comparison: &Comparison<'_>) -> Vec<Vec<Cell>> {
             cost(entry.record)
         });
         let title = format!("{title} within {BOUND} % error");
-        rows.extend(rows_of(comparison, &Criterion { title, values, text, of }));
+        rows.extend(criterion_row(comparison, &Criterion { title, values, text, of }));
     }
     rows
 }
@@ -237,7 +235,7 @@ fn level_nearest(comparison: &Comparison<'_>, usual: f64) -> Option<(usize, usiz
 
 /// For each series and mesh the least value of its results, at one level or at all of them. The medial mesh that all
 /// methods start from is no method's result.
-pub(crate) fn values(
+fn values(
     comparison: &Comparison<'_>,
     level: Option<usize>,
     value: impl Fn(&Entry<'_>) -> Option<f64>,
@@ -315,11 +313,6 @@ fn by_median(a: &Rank, b: &Rank) -> Ordering {
         .then(a.series.cmp(&b.series))
 }
 
-/// The one with a result on the most meshes first.
-fn by_meshes(a: &Rank, b: &Rank) -> Ordering {
-    a.missed.cmp(&b.missed).then_with(|| by_median(a, b))
-}
-
 /// The series that have a median, the best first.
 pub(crate) fn ranked(values: &[Values]) -> Vec<Rank> {
     let ranks = values.iter().enumerate().map(|(series, values)| Rank::of(series, values));
@@ -328,39 +321,23 @@ pub(crate) fn ranked(values: &[Values]) -> Vec<Rank> {
     ranks
 }
 
-/// The rows of a criterion: the best median, and if different the method with the most results. Empty if no method
-/// has a median.
-fn rows_of(comparison: &Comparison<'_>, criterion: &Criterion) -> Vec<Vec<Cell>> {
-    let mut ranks = ranked(&criterion.values);
-    let Some(first) = ranks.first().map(|rank| rank.series) else { return vec![] };
-    let pairs =
-        Pairs::of(ranks.iter().map(|rank| rank.series).collect(), &samples(&criterion.values));
-    let mut rows = vec![row_of(comparison, criterion, criterion.title.clone(), &ranks, &pairs)];
-    ranks.sort_by(by_meshes);
-    if ranks[0].series != first {
-        let title = criterion.title.clone() + MOST_MESHES;
-        rows.push(row_of(comparison, criterion, title, &ranks, &pairs));
-    }
-    rows
+/// The row of a criterion: that of the best median. None if no method has a median.
+fn criterion_row(comparison: &Comparison<'_>, criterion: &Criterion) -> Option<Vec<Cell>> {
+    let ranks = ranked(&criterion.values);
+    (!ranks.is_empty()).then(|| row_of(comparison, criterion, &ranks))
 }
 
 /// The row of the first of the ranked methods.
-fn row_of(
-    comparison: &Comparison<'_>,
-    criterion: &Criterion,
-    title: String,
-    ranks: &[Rank],
-    pairs: &Pairs,
-) -> Vec<Cell> {
+fn row_of(comparison: &Comparison<'_>, criterion: &Criterion, ranks: &[Rank]) -> Vec<Cell> {
     let first = ranks[0].series;
+    let pairs =
+        Pairs::of(ranks.iter().map(|rank| rank.series).collect(), &samples(&criterion.values));
     let known = criterion.values[first].iter().flatten();
     let met = known.clone().filter(|found| found.value.is_finite());
     let seconds = middle(met.clone().map(|found| found.seconds));
-    // A row of the most meshes is not ranked by values.
-    let is_by_value = !title.ends_with(MOST_MESHES);
     let is_time = criterion.of == TIME;
     let mut cells = vec![
-        Cell::from(title),
+        Cell::from(criterion.title.clone()),
         Cell { best: true, ..Cell::from(comparison.series[first].as_str()) },
         Cell::optional(ranks[0].median.filter(|_| !is_time).map(criterion.text)),
         Cell::optional(match is_time {
@@ -371,7 +348,6 @@ fn row_of(
     ];
     let runner_up = ranks.get(1).map(|rank| rank.series);
     let pair = runner_up.and_then(|second| pairs.between(first, second));
-    let pair = pair.filter(|_| is_by_value);
     let ratio = pair.as_ref().and_then(|pair| {
         let ratio = pair.ratio_text()?;
         Some(format!("{ratio} of {}", criterion.of))
@@ -404,8 +380,7 @@ fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) ->
         cells.extend([(); 6].map(|()| Cell::optional(None)));
         return cells;
     }
-    let pairs = Pairs::of(ranks.iter().map(|rank| rank.series).collect(), &samples(&errors));
-    row_of(comparison, &error_criterion(errors, title.clone()), title, &ranks, &pairs)
+    row_of(comparison, &error_criterion(errors, title), &ranks)
 }
 
 /// One method at one error bound.

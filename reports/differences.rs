@@ -59,29 +59,6 @@ pub(crate) fn difference_tables(comparison: &Comparison<'_>, how: &str) -> Vec<T
     tables
 }
 
-/// A table for each number of spheres: one method against each other one. Empty where it has no median.
-pub(crate) fn against_others(comparison: &Comparison<'_>, series: usize) -> Vec<Table> {
-    let mut tables = vec![];
-    for (spheres, pairs) in rankings(comparison) {
-        let others =
-            pairs.series.iter().filter_map(|&other| Some((other, pairs.between(series, other)?)));
-        let others: Vec<(usize, Paired)> = others.collect();
-        let rows = Table::of(&others)
-            .text("other method", |(other, _)| comparison.series[*other].as_str())
-            .text("Hausdorff ÷ its", |(_, pair)| Cell::optional(pair.ratio_text()))
-            .number("n", |(_, pair)| pair.meshes().to_string())
-            .text("better, equal, worse", |(_, pair)| {
-                pair.outcomes.map(|n| n.to_string()).join(", ")
-            })
-            .number("p", |(_, pair)| p_text(pair.corrected))
-            .text("established", |(_, pair)| if pair.is_established() { "yes" } else { "no" });
-        let caption = format!("Against the others at {}", counted(spheres, "sphere", "spheres"));
-        let notes = vec![NOTE.to_owned()];
-        tables.extend((!others.is_empty()).then_some(Table { caption, notes, ..rows.table }));
-    }
-    tables
-}
-
 const NOTE: &str = "By median Hausdorff error. Ratios are geometric means over the meshes where both have a result, with \
     95 % intervals from 2,000 resampled sets of meshes, if they are at least six. n: meshes where either has a result; a \
     missing one, or an error above 5 %, counts as infinite. Effect: from -1, worse on all meshes, to 1. p: two-sided \

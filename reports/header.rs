@@ -17,8 +17,7 @@ pub struct Header {
     /// The runs that made the records, in their order.
     #[serde(default)]
     pub runs: Vec<RunNote>,
-    /// The methods that can run or have records, for their names and citations. Those without a record are named as
-    /// not run.
+    /// The methods that can run or have records, for their names and citations.
     #[serde(default)]
     pub methods: Vec<MethodNote>,
     /// The study of the last run, as a file.
@@ -33,20 +32,6 @@ pub struct Header {
     /// Whether the page is part of a [site](crate::write_site).
     #[serde(skip)]
     pub is_site: bool,
-    /// The state of a comparison that still adds records; `None` once it has ended.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub running: Option<Running>,
-}
-
-/// How far a comparison is that still adds records.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Running {
-    /// Number of methods that have all their results.
-    pub done: usize,
-    /// Number of methods that were requested.
-    pub total: usize,
-    /// The methods without all their results, in the order in which they run.
-    pub missing: Vec<String>,
 }
 
 /// One run of the program that added records.
@@ -142,32 +127,6 @@ impl Header {
              {{https://github.com/medial-rs/medial}},\n  note = {{Version {version}}}\n}}"
         ));
         entries.join("\n\n") + "\n"
-    }
-
-    /// The methods without a record of a comparison, unless they are still to run.
-    pub(crate) fn not_run(&self, methods: &[&str]) -> Vec<&MethodNote> {
-        let awaited = |id: &String| self.running.as_ref().is_some_and(|r| r.missing.contains(id));
-        let notes = self.methods.iter();
-        notes.filter(|note| !methods.contains(&note.id.as_str()) && !awaited(&note.id)).collect()
-    }
-
-    /// The command that adds results of methods to those of the last run.
-    pub(crate) fn command_with(&self, methods: &[&str]) -> String {
-        let last = self.runs.last().and_then(|run| run.command.strip_prefix("medial compare"));
-        let mut words = last.unwrap_or(" MESH --out DIR").split(' ').skip(1);
-        let mut command = "medial compare".to_owned();
-        while let Some(word) = words.next() {
-            match word {
-                // They name other methods, or would run the rest again.
-                "--methods" | "--set" | "--levels" | "--after-filters" | "--shard" => {
-                    words.next();
-                }
-                "--fresh" | "--retry-failed" => {}
-                _ if word.starts_with("--methods=") => {}
-                _ => command = command + " " + word,
-            }
-        }
-        format!("{command} --methods {}", methods.join(","))
     }
 
     /// One sentence with version, date and command, for every file.

@@ -43,7 +43,7 @@ mod tables;
 mod view3d;
 mod write;
 
-pub use header::{Header, MethodNote, RunNote, Running};
+pub use header::{Header, MethodNote, RunNote};
 pub use metric::measured_rows;
 pub use overview::{reasons, summary_text};
 pub use pictures::{PictureStrip, picture_strips};

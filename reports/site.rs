@@ -1,4 +1,4 @@
-//! A static site: the page of a report, with a page for each method, each mesh and the external results.
+//! A static site: the page of a report, with a page for each method and each mesh.
 //!
 //! The further pages have no script. Everything is in one folder, with relative links, so it opens from disk and from any
 //! static host.
@@ -7,11 +7,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use medial_run::error::FileError;
-use medial_run::record::{Record, Status};
+use medial_run::record::Record;
 use medial_run::text::{escape_html, file_stems, grouped};
 
 use crate::comparison::{Comparison, Entry, reached};
-use crate::differences::against_others;
 use crate::header::{Header, MethodNote, method_pages};
 use crate::metric::{HAUSDORFF, MEAN_ERROR, MIN_ANGLE, TOTAL_SECONDS};
 use crate::pictures::strips;
@@ -55,11 +54,10 @@ pub fn write_site(
         let page = site.mesh_page(mesh, picture, |file| report.contains(&dir.join(file)));
         files.write(&mesh_file(stem), page.as_bytes())?;
     }
-    files.write(SUBMISSIONS, site.submissions_page().as_bytes())?;
     Ok([report, files.written].concat())
 }
 
-const SUBMISSIONS: &str = "submissions.html";
+const SUBMISSIONS: &str = "https://github.com/medial-rs/medial/blob/main/docs/submit.md";
 
 fn mesh_file(stem: &str) -> String {
     format!("mesh-{stem}.html")
@@ -115,10 +113,6 @@ impl Site<'_> {
             if comparison.series[series] != note.id {
                 body += &format!("<h2>{}</h2>\n", escape_html(&comparison.series[series]));
             }
-            let mut others = against_others(comparison, series);
-            // One note, below the last.
-            others.iter_mut().skip(1).for_each(|table| table.notes.clear());
-            body += &others.iter().rev().map(|table| to_html(table, &link)).collect::<String>();
             body += &to_html(&self.results(series), &link);
         }
         if !note.params.is_empty() {
@@ -205,55 +199,4 @@ impl Site<'_> {
         body += &to_html(&table, &|text| self.link(text));
         self.page(name, &body)
     }
-
-    fn submissions_page(&self) -> String {
-        let comparison = self.comparison;
-        let external: Vec<&Entry<'_>> = comparison
-            .entries
-            .iter()
-            .filter(|entry| entry.record.status == Status::External)
-            .collect();
-        let rows = Table::of(&external)
-            .text("results", |entry| comparison.series[entry.series].as_str())
-            .text("mesh", |entry| comparison.meshes[entry.mesh].as_str())
-            .number("spheres", |entry| {
-                Cell::optional(reached(entry.record).map(|n| grouped(n as u64)))
-            })
-            .number(HAUSDORFF.heading(), |entry| {
-                Cell::optional(HAUSDORFF.of(entry.record).map(|error| HAUSDORFF.format(error)))
-            })
-            .number(MEAN_ERROR.heading(), |entry| {
-                Cell::optional(MEAN_ERROR.of(entry.record).map(|error| MEAN_ERROR.format(error)))
-            })
-            .text("as solid", |entry| topology_word(entry))
-            .number("claimed seconds", |entry| {
-                let claimed = entry.record.simplify.params.0.get("claimed_seconds");
-                Cell::optional(
-                    claimed.and_then(|value| value.as_f64()).map(|seconds| seconds.to_string()),
-                )
-            });
-        let note =
-            "Errors and topology are measured from the files. Seconds are as claimed.".to_owned();
-        let table =
-            Table { caption: "Handed-in results".to_owned(), notes: vec![note], ..rows.table };
-        let mut body = HAND_IN.to_owned();
-        if external.is_empty() {
-            body += "<p>Nobody has handed in results for this comparison yet.</p>\n";
-        } else {
-            body += &to_html(&table, &|text| self.link(text));
-        }
-        self.page("Hand in results", &body)
-    }
 }
-
-/// As in docs/submit.md.
-const HAND_IN: &str = "<ol>\n<li>Put one medial mesh for each mesh and number of spheres in a folder: \
-    <code>MESH-COUNT.ma</code>, in the units of the mesh. The first line has the numbers of spheres, edges and faces; then \
-    come lines <code>v x y z r</code>, <code>e i j</code> and <code>f i j k</code>, counted from 0. A built-in mesh is \
-    written by <code>medial datasets make bracket -o bracket.off</code>. Any meshes and counts will do; the edition has 500, \
-    200 and 100 spheres.</li>\n<li>Add <code>method.toml</code> with title, authors, \
-    citation, bibtex, run, machine and, if you like, seconds.</li>\n<li>Check it as we do, and look at the page:\n\
-    <pre class=\"command\"><code>medial compare --dataset builtin --given 'NAME=FOLDER' --methods qmat --spheres 500,200,100 --counts-only \
-    --against 2027.1</code></pre></li>\n<li>Open a pull request that adds the folder below <code>submissions/</code>.</li>\n</ol>\n\
-    <p>Only the medial meshes count: every number but the claimed seconds is measured again. \
-    <a href=\"https://github.com/medial-rs/medial/blob/main/docs/submit.md\">More on handing in results</a></p>\n";

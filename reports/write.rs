@@ -19,7 +19,7 @@ use crate::header::Header;
 use crate::overview::overview_table;
 use crate::page::{MeshPart, MeshView, Page, gzip};
 use crate::pictures::{FOLDER, PictureStrip, VIEWS, strips};
-use crate::plots::{Figure, mean_figures, mesh_figures, profile_figures, profiles_csv};
+use crate::plots::{Figure, mean_figures, mesh_figures};
 use crate::summary::{MEANS, by_count, means_table, native_curves, native_table};
 use crate::tables::{Table, mesh_table, to_csv, to_latex, to_markdown, topic_tables};
 use crate::view3d::text_of;
@@ -79,21 +79,15 @@ pub fn write_report(
         }
     }
     let differences = if is_one { vec![] } else { difference_tables(&comparison, &how) };
-    let profiles = profile_figures(&comparison);
     if !differences.is_empty() {
         files.write_tables("overview-differences", "Differences between methods", &differences)?;
     }
     if !is_one {
-        let csvs = [
-            ("tables/overview-differences.csv", differences_csv(&comparison)),
-            ("tables/overview-profiles.csv", profiles_csv(&profiles)),
-        ];
-        for (name, csv) in csvs {
-            files.write(name, &csv.map_err(|error| FileError::at(name, error))?)?;
-        }
+        let name = "tables/overview-differences.csv";
+        let csv = differences_csv(&comparison).map_err(|error| FileError::at(name, error))?;
+        files.write(name, &csv)?;
     }
-    let mut figures = mean_figures(&comparison, &summaries, &natives);
-    figures.extend(profiles);
+    let figures = mean_figures(&comparison, &summaries, &natives);
     files.write_plots(&figures.iter().collect::<Vec<_>>())?;
 
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));

@@ -3,10 +3,9 @@
 
     scripts/check_statistics.py REPORT [REPORT ...]
 
-Reads results.csv of each report, computes the signed-rank tests, the corrected p-values, the intervals, the performance
-profile and the shares of error targets anew, and compares them with tables/overview-differences.csv and
-tables/overview-profiles.csv. Exits with 1 if a number differs by more than 1e-9. Needs numpy and scipy; without them it
-prints "skipped".
+Reads results.csv of each report, computes the signed-rank tests, the corrected p-values and the intervals anew, and
+compares them with tables/overview-differences.csv. Exits with 1 if a number differs by more than 1e-9. Needs numpy and
+scipy; without them it prints "skipped".
 """
 
 import csv
@@ -25,7 +24,6 @@ except ImportError:
 
 TOLERANCE = 1e-9
 RANKED = 5.0
-TARGETS = [5.0, 3.0, 2.0, 1.0, 0.5, 0.3, 0.2, 0.1]
 
 
 def read(path):
@@ -136,36 +134,6 @@ def check(report):
         for row, p in zip(group, holm(np.array(ps))):
             what = f"{report}, {spheres}, {row['method']} and {row['other']}, corrected p"
             result.same(what, p, float(row["p_corrected"]))
-
-    profiles = defaultdict(list)
-    for row in read(report / "tables/overview-profiles.csv"):
-        profiles[row["figure"], row["method"]].append((float(row["x"]), float(row["share"])))
-    counts = {spheres for spheres, _ in errors if any(map(math.isfinite, errors[spheres, _].values()))}
-    usual = min(sorted(counts, reverse=True), key=lambda count: abs(math.log(count / 100)), default=None)
-    least = defaultdict(lambda: math.inf)
-    for (spheres, _), own in errors.items():
-        for mesh, error in own.items() if spheres == usual else ():
-            least[mesh] = min(least[mesh], error)
-    costs = {"targets-spheres": defaultdict(dict), "targets-time": defaultdict(dict)}
-    for row in rows:
-        error = float(row["hausdorff"] or "inf") * 100
-        for figure, key in (("targets-spheres", "spheres"), ("targets-time", "seconds_total")):
-            cost = float(row[key] or "inf")
-            for target in TARGETS:
-                pair = (row["mesh"], target)
-                reached = cost if error <= target else math.inf
-                own = costs[figure][name(row)]
-                own[pair] = min(own.get(pair, math.inf), reached)
-    for (figure, method), curve in profiles.items():
-        if figure == "profile":
-            own = errors[usual, method]
-            values = [own[mesh] / least[mesh] for mesh in own if math.isfinite(least[mesh])]
-        else:
-            values = list(costs[figure][method].values())
-        ecdf = stats.ecdf([min(value, 1e300) for value in values])
-        for x, share in curve:
-            # A quotient on a step may differ in its last digit.
-            result.same(f"{report}, {figure}, {method} at {x}", ecdf.cdf.evaluate(x * (1 + 1e-12)), share)
     return result
 
 

@@ -2,11 +2,10 @@
 
 use std::collections::HashSet;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
 
 use clap::Args;
 use clap::builder::TypedValueParser;
-use medial_reports::{Running, read_header, reasons};
+use medial_reports::{read_header, reasons};
 use medial_run::input::Source;
 use medial_run::item::GIVEN;
 use medial_run::item::{Item, Keep};
@@ -189,31 +188,25 @@ pub fn run(
     let (dir, registry) = (&arguments.out, &*registry);
     let adds = levels > 0 || turns;
     let report = RunReport { dir, registry, provenance: &provenance, items: &items, adds };
-    let due = PAUSES.map(|pause| Instant::now() + pause);
-    let running = Running { total: methods_of(&items).len(), ..Running::default() };
-    let mut pages = Pages { report: &report, running, due };
-    if adds && dir.join(PAGE).exists() {
+    if adds {
         // An earlier page must not pass for a page of all records, even after a killed run.
-        pages.write(&left.iter().collect::<Vec<_>>());
+        side.store.remove_page()?;
     }
-    let mut on_recorded = |waiting: &[&Item]| pages.write(waiting);
-    let sides = std::slice::from_mut(&mut side);
-    let ended = run_items(&left, sides, global.quiet, &mut on_recorded);
+    let ended = run_items(&left, std::slice::from_mut(&mut side), global.quiet);
     let run = side.store.added;
     // The flag has no effect from here on.
     if interrupt::stop_listening() {
-        if run > 0 {
-            report.write(Some(pages.running), false)?;
-        }
         print_error(&format!(
-            "interrupted: recorded {run} of {levels} results; run the same command again to resume"
+            "interrupted: recorded {run} of {levels} results; run the same command again to resume, \
+             or make their page by `medial report {}`",
+            dir.display()
         ));
         return Ok(Exit::Interrupted);
     }
     ended?;
     // The store stays locked until its report is written; a worker would only hold memory.
     side.supervisors.clear();
-    let Rebuilt { records, files, undrawn, .. } = report.write(None, true)?;
+    let Rebuilt { records, files, undrawn, .. } = report.write()?;
     undrawn.iter().for_each(|why| note(global, why));
     let records = of_items(records, &items);
     let shown: HashSet<String> = left.iter().flat_map(Item::keys).collect();
@@ -225,47 +218,11 @@ pub fn run(
     finish(&records, shown, [run, found], arguments, &files, global)
 }
 
-/// The methods of some items, each once.
-fn methods_of<'i>(items: impl IntoIterator<Item = &'i Item>) -> Vec<String> {
-    let mut seen = HashSet::new();
-    let labels = items.into_iter().map(|item| item.method.label().to_owned());
-    labels.filter(|label| seen.insert(label.clone())).collect()
-}
-
-/// The pages during a run. They take at most about a thirtieth of its time.
-struct Pages<'r> {
-    report: &'r RunReport<'r>,
-    /// The state that the next page shows.
-    running: Running,
-    /// The times of the next page, and of the next one with new pictures.
-    due: [Instant; 2],
-}
-
 /// Numbers of spheres on the example shapes, which need few and show all methods within a minute.
 const EXAMPLE_COUNTS: [usize; 2] = [100, 50];
 
 /// The largest number of seeds of a method.
 const MOST_SEEDS: u64 = 1_000;
-
-/// The least time between two pages, and between two with new pictures.
-const PAUSES: [Duration; 2] = [Duration::ZERO, Duration::from_secs(10)];
-
-impl Pages<'_> {
-    /// Writes a page with the list of waiting items, if one is due. The last page is that of the whole run.
-    fn write(&mut self, waiting: &[&Item]) {
-        let (begun, running) = (Instant::now(), &mut self.running);
-        running.missing = methods_of(waiting.iter().copied());
-        running.done = running.total - running.missing.len();
-        if waiting.is_empty() || begun < self.due[0] {
-            return;
-        }
-        let draws = begun >= self.due[1];
-        // A fault of the folder ends the run at the next record or at the last page.
-        let _ = self.report.write(Some(running.clone()), draws);
-        let kind = usize::from(draws);
-        self.due[kind] = Instant::now() + PAUSES[kind].max(30 * begun.elapsed());
-    }
-}
 
 /// The study of the command line, based on the study file if there is one.
 fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {

@@ -150,7 +150,7 @@ fn alternate(
             .iter()
             .any(|side| !side.store.missing(&side.supervisors[0].own(item), false).is_empty())
     });
-    let ended = run_items(&left, &mut sides, global.quiet, &mut |_| ());
+    let ended = run_items(&left, &mut sides, global.quiet);
     if interrupt::stop_listening() {
         print_error(
             "interrupted: recorded the finished results; run the same command again to resume",

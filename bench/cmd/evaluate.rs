@@ -18,8 +18,6 @@ use crate::exit::{Exit, Failure};
 use crate::files::shape_of;
 use crate::output::{counted, note, print_error, print_json, print_line, print_result};
 use crate::progress::StageLine;
-use crate::study::edition::Edition;
-use crate::study::registry::Registry;
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -44,10 +42,6 @@ pub struct Arguments {
     /// Measure the spheres alone, without edges and faces.
     #[arg(long)]
     spheres_alone: bool,
-    /// Also print the rank of each result among those of an edition at its sphere count, measured as the edition is: a
-    /// name such as `2027.1`, or a folder.
-    #[arg(long, value_name = "EDITION", conflicts_with_all = ["samples", "seed"])]
-    against: Option<PathBuf>,
     /// Compare the sheets with those of this medial mesh, such as a dense axis of the surface.
     #[arg(long, value_name = "X.ma")]
     reference: Option<PathBuf>,
@@ -57,12 +51,8 @@ pub struct Arguments {
 
 /// Runs the verb. With several files, a file that cannot be read is reported and the others are evaluated. Fails when
 /// the surface or the only medial mesh is refused.
-pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
-    let edition = arguments.against.as_deref().map(Edition::open).transpose()?;
-    let options = match &edition {
-        Some(edition) => edition.description.judge_options(),
-        None => arguments.measure.judge_options(arguments.seed),
-    };
+pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
+    let options = arguments.measure.judge_options(arguments.seed);
     let line = global.stages();
     line.at("reading");
     let (input, shape) = shape_of(&arguments.mesh, ShapeOptions::default(), false)?;
@@ -84,18 +74,13 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let rows = arguments.axes.iter().map(|path| evaluate(path, arguments, &evaluator, &line));
     let mut rows: Vec<_> = rows.collect();
     drop(line);
-    for row in rows.iter_mut().flatten() {
-        let place = |edition: &Edition| edition.place(&input.hash, &row.evaluation, registry);
-        row.place = edition.as_ref().map(place);
-    }
     let warnings = &[&input.report.warnings[..], &shape.remarks()].concat();
     // One file keeps the exit codes and the object of a single evaluation.
     if rows.len() == 1 {
         let row = rows.remove(0)?;
         row.notes.iter().for_each(|line| note(global, line));
         let warnings = [&row.defects[..], warnings].concat();
-        let mut text = described(&row.evaluation);
-        row.place.iter().for_each(|place| text += &format!("\n  {place}"));
+        let text = described(&row.evaluation);
         let all = [&row.evaluation.warnings[..], &warnings].concat();
         return Ok(print_result(global, &row, &text, &all));
     }
@@ -116,9 +101,6 @@ struct Evaluated {
     /// The change of units before the evaluation, if `--fit` found one.
     #[serde(skip_serializing_if = "Option::is_none")]
     fit: Option<Fit>,
-    /// The rank in an edition, with `--against`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    place: Option<String>,
     /// Notes of the reader.
     // Not in JSON, because no number depends on them.
     #[serde(skip)]
@@ -145,7 +127,7 @@ fn evaluate(
     let (loaded, fit) = read_axis(path, evaluator.shape, arguments.fitting.into())?;
     let LoadedMa { mesh, notes, warnings: defects, .. } = loaded;
     let evaluation = evaluator.evaluate(&mesh).map_err(failed)?;
-    Ok(Evaluated { evaluation, fit, place: None, notes, defects })
+    Ok(Evaluated { evaluation, fit, notes, defects })
 }
 
 /// The evaluations next to each other: a row for each metric, a column for each file.
@@ -219,7 +201,6 @@ fn print_table(
     }
     for (file, row) in files.iter().zip(rows) {
         let Ok(row) = row else { continue };
-        row.place.iter().for_each(|place| print_line(&format!("{}: {place}", file.display())));
         for warning in row.evaluation.warnings.iter().chain(&row.defects) {
             print_line(&format!("warning: {}: {warning}", file.display()));
         }

@@ -71,7 +71,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     if let Some(site) = &arguments.site {
         // Somebody else's index.html must not be replaced.
         let is_empty = fs::read_dir(site).map_or(true, |mut files| files.next().is_none());
-        if !is_empty && !site.join("submissions.html").exists() {
+        if !is_empty && !site.join("results.csv.gz").exists() {
             return Err(Failure::at(site, "not empty and no earlier site (expected a new folder)"));
         }
         let of_site = rebuild(dir, Some(site), registry)?;

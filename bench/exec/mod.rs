@@ -21,7 +21,6 @@ use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
 use medial_run::item::{Item, Limits};
-use medial_run::journal::replace_file;
 use medial_run::level::Target;
 use medial_run::outcome::failure_record;
 use medial_run::record::Provenance;
@@ -35,7 +34,6 @@ use crate::exec::worker::{Worker, WorkerOptions};
 use crate::exit::{Exit, Failure};
 use crate::plugin::last_line;
 use crate::process_tree::ending_signal;
-use crate::store::AGAIN;
 
 /// Runs items one after another, in a worker that it replaces when an item has broken it.
 pub struct Supervisor<'a> {
@@ -52,8 +50,6 @@ pub struct Supervisor<'a> {
     /// An input that ended its worker.
     // Its other items are not tried: they would end the next worker at the same place.
     lost: Option<(SceneSpec, Fault)>,
-    /// Commands that run items again whose worker ended.
-    again: Vec<String>,
 }
 
 /// The times of a repetition of a level, and a hash of its result.
@@ -85,7 +81,6 @@ impl<'a> Supervisor<'a> {
             worker: None,
             input: None,
             lost: None,
-            again: Vec::new(),
         }
     }
 
@@ -290,14 +285,14 @@ impl<'a> Supervisor<'a> {
             // Also between events: a worker that sends events without end must not escape the limit.
             if since.elapsed() > limits.time() {
                 worker.end();
-                return Ok(self.ended(request, stage, timed_out(stage, &limits)));
+                return Ok(Attempt::Ended(stage, timed_out(stage, &limits)));
             }
             // The memory limit of the worker does not cover the programs that it started.
             if looked.elapsed() >= LOOK_AGAIN {
                 looked = Instant::now();
                 if worker.resident_bytes() > limits.bytes {
                     worker.end();
-                    return Ok(self.ended(request, stage, out_of_memory(stage, &limits)));
+                    return Ok(Attempt::Ended(stage, out_of_memory(stage, &limits)));
                 }
             }
             match worker.listen(LOOK_AGAIN) {
@@ -349,7 +344,7 @@ impl<'a> Supervisor<'a> {
                     // A refused allocation that the worker survived did not end it.
                     let memory_refused = memory_refused && !status.is_some_and(|s| s.success());
                     let fault = ended(stage, status, &stderr, memory_refused, &limits);
-                    return Ok(self.ended(request, stage, fault));
+                    return Ok(Attempt::Ended(stage, fault));
                 }
                 Err(RecvTimeoutError::Timeout) => {}
             }
@@ -364,32 +359,6 @@ impl<'a> Supervisor<'a> {
             "(found {found}, expected protocol {PROTOCOL}); name a build of medial of the same protocol"
         );
         Failure::at(program, format!("not a worker of this build {why}"))
-    }
-
-    /// The end of a worker. The request stays in a file, with a command that runs it again.
-    fn ended(&mut self, request: &Request, stage: Stage, fault: Fault) -> Attempt {
-        if let (Some(axes), Some(item)) = (&self.axes, request.item()) {
-            let key = item.levels.first().map_or_else(String::new, |&level| item.key(level));
-            let file =
-                axes.with_file_name(AGAIN).join(format!("{}.json", &key[..key.len().min(12)]));
-            let text = serde_json::to_string(request).expect("plain data") + "\n";
-            // Without the file the record still has the reason.
-            if replace_file(&file, text.as_bytes()).is_ok() {
-                let program = self.program.as_deref().unwrap_or(Path::new("medial"));
-                let (mesh, method) = (&item.scene.mesh, item.method.label());
-                let (words, file) = (self.options(request).arguments().join(" "), file.display());
-                self.again.push(format!(
-                    "{mesh}, {method}: run this item again by `{} {words} < '{file}'`",
-                    program.display()
-                ));
-            }
-        }
-        Attempt::Ended(stage, fault)
-    }
-
-    /// The commands that run items again whose worker ended, since the last call.
-    pub fn take_again(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.again)
     }
 
     /// The options of the worker of a request.

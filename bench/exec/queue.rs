@@ -9,7 +9,6 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
 use std::{fs, io, thread};
 
 use medial_reports::reasons;
@@ -62,14 +61,12 @@ pub fn refused_params(
 /// alternate, so that a slow minute of the machine does not affect one method only. Their records are written after
 /// the last repetition.
 ///
-/// As many items run at the same time as each side has supervisors. `on_recorded` gets the remaining items after each
-/// recorded one. With one supervisor nothing else runs while an item is timed. Fails when the user interrupts, no
-/// worker can be started, or records cannot be written.
+/// As many items run at the same time as each side has supervisors. With one supervisor nothing else runs while an item
+/// is timed. Fails when the user interrupts, no worker can be started, or records cannot be written.
 pub fn run_items(
     items: &[Item],
     sides: &mut [Contender<'_>],
     is_quiet: bool,
-    on_recorded: &mut (dyn FnMut(&[&Item]) + Send),
 ) -> Result<(), Failure> {
     let (mut lanes, mut stores): (Vec<Lane<'_, '_>>, _) = (Vec::new(), Vec::new());
     for Contender { supervisors, store } in sides {
@@ -78,14 +75,12 @@ pub fn run_items(
         lanes.iter_mut().zip(supervisors).for_each(|(lane, supervisor)| lane.push(supervisor));
     }
     let takes_turns = |a: &Item, b: &Item| a.scene == b.scene && a.repeat > 1 && b.repeat > 1;
-    let turns = items.iter().flat_map(|item| vec![item.method.label(); item.repeat.max(1)]);
+    let turns = items.iter().map(|item| item.repeat.max(1)).sum();
     let desk = Mutex::new(Desk {
         jobs: lanes.len(),
         batches: items.chunk_by(takes_turns).enumerate().collect(),
-        waiting: items.iter().collect(),
         stores,
-        progress: Progress::new(is_quiet, turns.collect(), lanes.len()),
-        on_recorded,
+        progress: Progress::new(is_quiet, turns),
     });
     thread::scope(|scope| {
         let lanes: Vec<_> =
@@ -104,11 +99,8 @@ struct Desk<'d> {
     jobs: usize,
     /// Items that take turns, with the number of the batch.
     batches: VecDeque<(usize, &'d [Item])>,
-    /// Items without records.
-    waiting: Vec<&'d Item>,
     stores: Vec<&'d mut Store>,
     progress: Progress,
-    on_recorded: &'d mut (dyn FnMut(&[&Item]) + Send),
 }
 
 fn lock<'m, 'd>(desk: &'m Mutex<Desk<'d>>) -> MutexGuard<'m, Desk<'d>> {
@@ -121,7 +113,7 @@ fn work(lane: &mut Lane<'_, '_>, desk: &Mutex<Desk<'_>>) -> Result<(), Failure> 
         let Some((number, batch)) = lock(desk).batches.pop_front() else { return Ok(()) };
         let ended = run_batch(number, batch, lane, desk);
         let mut desk = lock(desk);
-        if let Err(error) = ended.and_then(|records| desk.record(batch, records)) {
+        if let Err(error) = ended.and_then(|records| desk.record(records)) {
             // The other lanes end after their present items.
             desk.batches.clear();
             return Err(error);
@@ -143,7 +135,6 @@ fn run_batch(
         }
         for (place, (item, by_side)) in batch.iter().zip(&mut all).enumerate() {
             lock(desk).progress.at(&item.scene.mesh, item.method.label(), [turn, item.repeat]);
-            let begun = Instant::now();
             // Each side begins equally often: the second one profits from the file cache of the system.
             let first = number + place + turn;
             let sides = lane.len();
@@ -151,14 +142,13 @@ fn run_batch(
                 let records = &mut by_side[side];
                 if turn == 1 {
                     *records = lane[side].run(item)?;
-                    let (remarks, again) = (reasons(records), lane[side].take_again());
-                    remarks.iter().chain(&again).for_each(|it| lock(desk).progress.remark(it));
+                    reasons(records).iter().for_each(|it| lock(desk).progress.remark(it));
                 } else if records.iter().any(|record| record.status.has_result()) {
                     let again = lane[side].again(item, records)?;
                     merge(records, turn, again);
                 }
             }
-            lock(desk).progress.done(item.method.label(), begun.elapsed().as_secs_f64());
+            lock(desk).progress.done();
         }
     }
     Ok(all)
@@ -166,8 +156,8 @@ fn run_batch(
 
 impl Desk<'_> {
     /// Records a batch with the seconds of the median repetition.
-    fn record(&mut self, batch: &[Item], all: Vec<Vec<Vec<Record>>>) -> Result<(), Failure> {
-        for (item, sides) in batch.iter().zip(all) {
+    fn record(&mut self, all: Vec<Vec<Vec<Record>>>) -> Result<(), Failure> {
+        for sides in all {
             for (store, mut records) in self.stores.iter_mut().zip(sides) {
                 for record in &mut records {
                     if let Some(seconds) = median(&record.repetitions, |r| r.seconds) {
@@ -179,8 +169,6 @@ impl Desk<'_> {
                 }
                 store.append(&records)?;
             }
-            self.waiting.retain(|other| !std::ptr::eq(*other, item));
-            (self.on_recorded)(&self.waiting);
         }
         Ok(())
     }

@@ -94,10 +94,6 @@ fn requests() -> Receiver<Request> {
             }
         }
         drop(sender);
-        // The request of an item that a person runs again: its end is not that of a supervisor.
-        if stdin_is_file() {
-            return;
-        }
         // Time for an idle worker to end by itself.
         thread::sleep(Duration::from_millis(200));
         process_tree::end_descendants();
@@ -108,18 +104,6 @@ fn requests() -> Receiver<Request> {
         std::process::exit(0);
     });
     receiver
-}
-
-fn stdin_is_file() -> bool {
-    #[cfg(unix)]
-    {
-        use std::os::fd::AsFd;
-        let input = io::stdin().as_fd().try_clone_to_owned();
-        let kind = input.and_then(|input| std::fs::File::from(input).metadata());
-        kind.is_ok_and(|kind| kind.is_file())
-    }
-    #[cfg(not(unix))]
-    false
 }
 
 /// The scene of an item: the present one if it fits, else a new one.

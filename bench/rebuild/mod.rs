@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use jiff::tz::TimeZone;
-use medial_reports::{Header, MethodNote, RunNote, Running, read_header, write_report, write_site};
+use medial_reports::{Header, MethodNote, RunNote, read_header, write_report, write_site};
 use medial_run::input::Source;
 use medial_run::item::GIVEN;
 use medial_run::item::Item;
@@ -51,7 +51,7 @@ pub fn rebuild(dir: &Path, site: Option<&Path>, registry: &Registry) -> Result<R
     let (records, warnings) = some_records(dir)?;
     let header = header(dir, &records, registry, &warnings);
     let items = items_of(dir, registry);
-    write([dir, site.unwrap_or(dir)], (records, warnings), (&items, registry), header, true)
+    write([dir, site.unwrap_or(dir)], (records, warnings), (&items, registry), header)
 }
 
 /// The records of a store, at least one, and warnings about lines without a record.
@@ -81,7 +81,7 @@ fn sources(dir: &Path) -> Vec<Source> {
     study.and_then(|study| study.sources().ok()).unwrap_or_default()
 }
 
-/// The report of a run of `compare`, during the run and after it.
+/// The report of a run of `compare`.
 pub struct RunReport<'a> {
     pub dir: &'a Path,
     pub registry: &'a Registry,
@@ -93,18 +93,16 @@ pub struct RunReport<'a> {
 }
 
 impl RunReport<'_> {
-    /// Writes the report, marked while the run continues, with new pictures if `draws`. Without new records the page
-    /// stays unchanged. Fails when the records cannot be read, or the report cannot be written.
-    pub fn write(&self, running: Option<Running>, draws: bool) -> Result<Rebuilt, Failure> {
+    /// Writes the report. Without new records the page stays unchanged. Fails when the records cannot be read, or the
+    /// report cannot be written.
+    pub fn write(&self) -> Result<Rebuilt, Failure> {
         let (records, warnings) = records(self.dir)?;
-        let is_marked = read_header(self.dir).is_ok_and(|header| header.running.is_some());
         // Byte for byte the same page: a repeated command changes no file.
-        if !self.adds && self.dir.join(PAGE).exists() && !is_marked {
+        if !self.adds && self.dir.join(PAGE).exists() {
             let (files, undrawn) = (vec![], vec![]);
             return Ok(Rebuilt { records, files, warnings, undrawn });
         }
         let mut header = header(self.dir, &records, self.registry, &warnings);
-        header.running = running;
         let Provenance { command, binary_hash, .. } = self.provenance;
         let mut runs = header.runs.iter_mut();
         if let Some(run) = runs.find(|r| (&r.command, &r.binary_hash) == (command, binary_hash)) {
@@ -113,7 +111,7 @@ impl RunReport<'_> {
             run.date.get_or_insert_with(|| now.date().to_string());
         }
         let dirs = [self.dir; 2];
-        write(dirs, (records, warnings), (self.items, self.registry), header, draws)
+        write(dirs, (records, warnings), (self.items, self.registry), header)
     }
 }
 
@@ -123,7 +121,6 @@ fn write(
     (mut records, warnings): (Vec<Record>, Vec<String>),
     (items, registry): (&[Item], &Registry),
     mut header: Header,
-    draws: bool,
 ) -> Result<Rebuilt, Failure> {
     // Tables follow the order of the records: that of the study, not that of the runs.
     let order = positions(items);
@@ -140,7 +137,7 @@ fn write(
     header.notes.extend(mixed.iter().flat_map(|mixed| mixed.notes.clone()));
     let shown = mixed.map_or_else(|| records.clone(), |mixed| mixed.records);
     // Pictures of inputs that can no longer be read stay unchanged.
-    let undrawn = if draws { pictures::draw([dir, to], &shown, &sources(dir)) } else { Vec::new() };
+    let undrawn = pictures::draw([dir, to], &shown, &sources(dir));
     let files = match dir == to {
         true => write_report(dir, &shown, &header)?,
         false => write_site(to, dir, &shown, &header)?,
@@ -189,7 +186,6 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
         notes: warnings.to_vec(),
         groups: Study::read(&dir.join(STUDY)).map(|study| study.groups).unwrap_or_default(),
         is_site: false,
-        running: None,
     };
     for record in records {
         if !header
@@ -207,7 +203,7 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
             });
         }
     }
-    // Methods of this program get their present descriptions, also methods without a record, which the page lists.
+    // Methods of this program get their present descriptions, also those that only an edition has run.
     // Plug-ins that are not loaded this time keep their earlier descriptions.
     let ids: BTreeSet<&str> = records.iter().map(|r| r.simplify.method.as_str()).collect();
     // A merged or cleared store can list methods without records.

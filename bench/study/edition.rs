@@ -8,14 +8,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use medial::complex::DualTriangulation;
-use medial::metrics::{DEFINITIONS, Evaluation, JudgeOptions};
+use medial::metrics::DEFINITIONS;
 use medial::read_regular;
 use medial::surface::Sampling;
 use medial_reports::editions::{DESCRIPTION, EDITIONS, Embedded, RECORDS, unpack};
 use medial_run::hash::hex_digest;
 use medial_run::item::Item;
 use medial_run::level::Target;
-use medial_run::record::{Record, is_near};
+use medial_run::record::Record;
 use medial_run::settings::VOLUME_DEPTH;
 use medial_run::text::did_you_mean;
 use medial_run::text::significant;
@@ -92,14 +92,6 @@ pub struct Mixed {
     pub records: Vec<Record>,
     /// Sentences on what was left out.
     pub notes: Vec<String>,
-}
-
-impl Description {
-    /// The options of the judge.
-    pub fn judge_options(&self) -> JudgeOptions {
-        let Self { samples, volume_depth, seed, .. } = *self;
-        JudgeOptions { samples, volume_depth, seed }
-    }
 }
 
 impl Edition {
@@ -217,59 +209,12 @@ impl Edition {
     }
 
     /// The methods whose version in this program is another one.
-    pub fn changed_methods(&self, registry: &Registry) -> BTreeSet<String> {
+    fn changed_methods(&self, registry: &Registry) -> BTreeSet<String> {
         let changed = self.records.iter().filter(|record| {
             let entry = registry.entry(&record.simplify.method);
             entry.is_some_and(|entry| entry.version("") != record.method_version)
         });
         changed.map(|record| record.simplify.method.clone()).collect()
-    }
-
-    /// The place of a result among those of the edition on its mesh and near its sphere count, as a sentence.
-    pub fn place(&self, hash: &str, evaluation: &Evaluation, registry: &Registry) -> String {
-        let Description { name, mesh, spheres, .. } = &self.description;
-        let own = evaluation.counts.spheres as usize;
-        let Some(mesh) = mesh.iter().find(|mesh| mesh.sha256 == hash) else {
-            return format!("this mesh is not in edition {name}");
-        };
-        let Some(&count) = spheres.iter().find(|&&count| is_near(own, count)) else {
-            let known: Vec<String> = spheres.iter().map(usize::to_string).collect();
-            let known = known.join(", ");
-            return format!("edition {name} has no results near {own} spheres (it has {known})");
-        };
-        let rivals = self.records.iter().filter(|record| {
-            record.simplify.level == Target::Spheres(count)
-                && record.mesh_hash.as_deref() == Some(hash)
-                && record.status.is_ok()
-        });
-        let mut changed = self.changed_methods(registry);
-        let mut ranked = BTreeSet::new();
-        let mut errors: Vec<f64> = vec![];
-        for record in rivals {
-            errors.extend(record.evaluate.as_ref().map(|e| e.distances.hausdorff));
-            ranked.insert(record.simplify.method.clone());
-        }
-        changed.retain(|method| ranked.contains(method));
-        let versions = match changed.into_iter().collect::<Vec<_>>() {
-            names if names.is_empty() => String::new(),
-            names if names.len() == ranked.len() => {
-                "; this program has other versions of all these methods".to_owned()
-            }
-            names => format!("; this program has other versions of {}", names.join(", ")),
-        };
-        let definitions = match self.description.metrics < DEFINITIONS {
-            true => "; measured by earlier definitions of the metrics",
-            false => "",
-        };
-        let error = evaluation.distances.hausdorff;
-        // The same result read from a file differs in its last digits.
-        let rank = 1 + errors.iter().filter(|&&other| other < (1.0 - 1e-9) * error).count();
-        format!(
-            "{} %: rank {rank} of {} at {count} spheres on {} ({name}{versions}{definitions})",
-            significant(100.0 * error, 3),
-            errors.len() + 1,
-            mesh.name
-        )
     }
 
     /// The records of a comparison on meshes of the edition, and the edition's on these meshes at the levels of the study.

@@ -202,16 +202,12 @@ impl Page<'_> {
         let pictured = (self.meshes.iter().enumerate())
             .filter(|(_, mesh)| mesh.picture.is_some() || mesh.view.is_some())
             .map(|(index, _)| index);
-        let absent = header.not_run(&comparison.methods);
-        let ids: Vec<&str> = absent.iter().map(|note| note.id.as_str()).collect();
-        let is_compared = comparison.measured() > 0 && !ids.is_empty();
         json!({
             "lead": self.lead(),
             "facts": self.facts(),
             "command": command,
             "earlier": runs.split_last().map_or(&[][..], |(_, earlier)| earlier).iter().map(earlier).collect::<Vec<_>>(),
             "study": header.study,
-            "running": header.running,
             "site": header.is_site,
             "alert": self.alert(),
             "notices": (comparison.edition_note().into_iter())
@@ -226,10 +222,6 @@ impl Page<'_> {
             "answers": self.answers.as_ref().map(without_command),
             "overview": self.overview,
             "leading": widest_spread(comparison, pictured),
-            "not_run": is_compared.then(|| json!({
-                "methods": absent.iter().map(|note| described(note)).collect::<Vec<_>>(),
-                "command": header.command_with(&ids),
-            })),
             "figures": if is_one { vec![] } else { figures(self.figures) },
             "sections": sections,
             "methods": methods.collect::<Vec<_>>(),

@@ -141,14 +141,6 @@ const methodsOf = (methods) => make("dl", {}, ...methods.flatMap(({ id, title, s
     .filter(Boolean).join(" "), make("cite", {}, citation)),
 ]));
 
-// The methods without a result, and how to add them.
-const notRunOf = ({ methods, command }) => {
-  const end = methods.length > 3 ? /[,;:.]/ : /\./; // of a few methods also their cost
-  const named = methods.map(({ id, home }) => home ? `${id} (${home[0].toLowerCase()}${home.slice(1).split(end)[0]})` : id);
-  return make("div", { class: "notrun" }, make("p", {}, make("strong", {}, "Not run: "), named.join(", "),
-    ". This command adds the missing results to this page:"), code(command));
-};
-
 // A fold whose content is made when it is first opened, or printed.
 const late = (details, build) => {
   details.fill = () => {
@@ -200,22 +192,16 @@ const start = async () => {
   const curves = overview.filter((figure) => figure.leading);
   const others = overview.filter((figure) => !figure.leading);
   const parts = [];
-  if (report.running) {
-    const { done, total, missing } = report.running;
-    const rest = missing.length ? `; missing: ${missing.join(", ")}` : "";
-    parts.push(make("p", { class: "notice running", role: "status" }, make("strong", {}, "Still running: "),
-      `${done} of ${counted(total, "method", "methods")} done${rest}. This page shows the results so far; reload it for more.`));
-  }
   if (report.alert) {
     parts.push(make("p", { class: "notice bad", role: "alert" }, report.alert));
   }
   if (report.notices.length) {
     parts.push(make("ul", { class: "notice" }, ...report.notices.map((text) => make("li", {}, text))));
   }
-  if (report.answers || report.not_run) {
-    const table = report.answers ?? { columns: [], rows: [], notes: [] };
-    parts.push(section("answers", "Which method?", report.answers && tableOf(table), report.not_run && notRunOf(report.not_run),
-      table.notes.length ? fold(null, "How the methods are ranked", ...table.notes.map(note)) : null));
+  if (report.answers) {
+    const { notes } = report.answers;
+    parts.push(section("answers", "Which method?", tableOf(report.answers),
+      notes.length ? fold(null, "How the methods are ranked", ...notes.map(note)) : null));
   }
   if (isOne) {
     const inner = meshParts(0, true, []).filter(Boolean);
@@ -238,7 +224,6 @@ const start = async () => {
   if (!isOne && report.meshes.length) folds.push(fold("meshes", "Each mesh: pictures, 3D, curves", ...meshFolds(bulk)));
   if (others.length) folds.push(late(fold("plots", "More plots"), () => [plotsOf(others)]));
   if (report.methods.length) folds.push(fold("methods", "Methods", methodsOf(report.methods)));
-  if (report.not_run) folds.push(fold("not-run", "Methods that were not run", methodsOf(report.not_run.methods), code(report.not_run.command)));
   folds.push(fold("definitions", "Definitions", listOf([...report.definitions, ...WORDS]),
     make("p", {}, "More terms: ", make("a", { href: GLOSSARY }, "the glossary"), ".")));
   if (report.papers) {
@@ -264,7 +249,7 @@ const start = async () => {
   const named = [...main.querySelectorAll(":scope > section > h2, #more > details.fold > summary")];
   document.querySelector("nav").append(...named.map((head) =>
     make("a", { href: `#${head.parentElement.id}` }, head.textContent)));
-  if (report.site) document.querySelector("nav").append(make("a", { href: "./submissions.html" }, "Hand in results"));
+  if (report.site) document.querySelector("nav").append(make("a", { href: "https://github.com/medial-rs/medial/blob/main/docs/submit.md" }, "Hand in results"));
   openTarget();
   document.documentElement.dataset.ready = "";
   // Pictures from files move what is below them.

@@ -9,8 +9,8 @@ const plotOf = (figure) => {
   const lay = (axis, value) => (figure[axis].scale === "log" ? Math.log(value) : value);
   const unlay = (axis, value) => (figure[axis].scale === "log" ? Math.exp(value) : value);
   const laid = ([x, y], more) => ({ u: lay("x", x), v: lay("y", y), x, y, ...more });
-  const points = figure.curves.flatMap((curve) => curve.points.map(([x, y, n, spheres, , isRising, bar], k, { length }) =>
-    laid([x, y], { n, spheres, isRising, bar, curve, isMarked: !figure.steps || (k + 1) % Math.ceil(length / 6) === 0 })).filter(({ u, v }) => Number.isFinite(u) && Number.isFinite(v)));
+  const points = figure.curves.flatMap((curve) => curve.points.map(([x, y, n, spheres, , isRising, bar]) =>
+    laid([x, y], { n, spheres, isRising, bar, curve })).filter(({ u, v }) => Number.isFinite(u) && Number.isFinite(v)));
   const lines = figure.curves.flatMap((curve) => curve.points.map((at) => laid(at, { curve })));
   const tags = figure.curves.flatMap((curve) => curve.points.filter((point) => point[4] !== null)
     .map((point) => laid(point, { text: point[4], curve })));
@@ -50,7 +50,7 @@ const plotOf = (figure) => {
 
   const words = ({ x, y, n, spheres, isRising, bar, curve }) => {
     const format = (value) => value.toLocaleString("en", { maximumSignificantDigits: 4 });
-    const of = n === null ? "" : figure.steps ? `n = ${n}` : `n = ${counted(n, "mesh", "meshes")}`;
+    const of = n === null ? "" : `n = ${counted(n, "mesh", "meshes")}`;
     return [curve.name, [curve.of, of].filter(Boolean).join(", "), `${figure.x.title}: ${format(x)}`,
       `${figure.y.title}: ${format(y)}`, spheres === null ? "" : `spheres: ${format(spheres)}`,
       bar ? `${n === 1 ? "range over seeds" : "95 % interval over meshes"}: ${bar.map(format).join(" to ")}` : "",
@@ -64,7 +64,6 @@ const plotOf = (figure) => {
     const seen = points.filter(isInside);
     const shown = ({ curve }) => !hidden.has(curve.series);
     const common = { x: "u", y: "v", clip: true };
-    const curve = figure.steps ? "step-after" : "linear";
     const barred = seen.filter((point) => point.bar);
     const hollow = ({ curve }) => (report.series[curve.series].hollow ? "var(--card)" : colour({ curve }));
     const symbol = ({ curve }) => report.series[curve.series].symbol;
@@ -79,10 +78,10 @@ const plotOf = (figure) => {
       x: axisOf("x", "u"), y: axisOf("y", "v"), color: { type: "identity" },
       marks: [
         Plot.frame({ stroke: "var(--rule)" }),
-        Plot.line(solid, { ...common, z, curve, stroke: colour, strokeWidth: 2 }),
+        Plot.line(solid, { ...common, z, stroke: colour, strokeWidth: 2 }),
         Plot.ruleX(barred, { x: "u", y1: ({ bar }) => lay("y", bar[0]), y2: ({ bar }) => lay("y", bar[1]), stroke: colour, strokeOpacity: 0.5, clip: true }),
         Plot.line(dashed, { ...common, z, stroke: colour, strokeWidth: 2, strokeDasharray: "7 5" }),
-        Plot.dot(seen.filter((point) => point.isMarked), { ...common, symbol, stroke: colour, fill: hollow, r: 4, clip: false }),
+        Plot.dot(seen, { ...common, symbol, stroke: colour, fill: hollow, r: 4, clip: false }),
         Plot.dot(seen.filter((point) => point.isRising), { ...common, r: 7.5, stroke: "currentColor", strokeWidth: 1.2, clip: false }),
         Plot.text(apart(), { x: "u", y: "v", text: "text", dx: 7, dy: -7, textAnchor: "start", fontSize: 10 }),
         Plot.dot(chosen, { x: "u", y: "v", r: 9, stroke: "currentColor", strokeWidth: 2 }),

@@ -4,7 +4,6 @@
 //! labels.
 
 mod axis;
-mod profiles;
 mod svg;
 
 use medial_run::text::{grouped, significant};
@@ -17,7 +16,6 @@ use crate::metric::{
 use crate::summary::{CountSummary, NativeCurve};
 
 pub(crate) use self::axis::Scale;
-pub(crate) use self::profiles::{profile_figures, profiles_csv};
 pub(crate) use self::svg::symbol;
 
 /// A figure before it is drawn. Its horizontal axis is logarithmic.
@@ -30,8 +28,6 @@ pub(crate) struct Figure {
     pub(crate) curves: Vec<Curve>,
     /// Whether the page shows it unfolded.
     pub(crate) leading: bool,
-    /// Whether values hold from a point to the next one; few points have a marker then.
-    pub(crate) steps: bool,
 }
 
 /// The points of one series.
@@ -82,7 +78,7 @@ impl Figure {
             })
         });
         json!({
-            "title": self.title, "leading": self.leading, "steps": self.steps,
+            "title": self.title, "leading": self.leading,
             "x": {"title": self.x, "scale": Scale::Log}, "y": {"title": self.y.0, "scale": self.y.1},
             "curves": curves.collect::<Vec<_>>(),
         })
@@ -132,7 +128,6 @@ impl Kind {
             y: (y.to_owned(), scale),
             curves,
             leading: matches!(*name, "hausdorff" | "time"),
-            steps: false,
         })
     }
 

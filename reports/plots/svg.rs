@@ -122,12 +122,8 @@ impl Figure {
         let mut taken = Vec::new(); // shared by all curves: tags of two must not meet
         for curve in &self.curves {
             let stroke = colour(curve.series).stroke_width(4);
-            let mut line: Vec<(f64, f64)> = vec![];
-            for Point { x, y, .. } in &curve.points {
-                // A share holds until the next value.
-                line.extend(line.last().filter(|_| self.steps).map(|last| (*x, last.1)));
-                line.push((*x, *y));
-            }
+            let line: Vec<(f64, f64)> =
+                curve.points.iter().map(|point| (point.x, point.y)).collect();
             if curve.dashed {
                 let dashes = DashedLineSeries::new(line, 14, 10, stroke);
                 chart.draw_series(dashes)?;
@@ -135,8 +131,7 @@ impl Figure {
                 chart.draw_series(LineSeries::new(line, stroke))?;
             }
             // Enough to distinguish the curves without colour.
-            let every = if self.steps { curve.points.len().div_ceil(6) } else { 1 };
-            for point in curve.points.iter().skip(every - 1).step_by(every) {
+            for point in &curve.points {
                 if let Some([low, high]) = point.bar {
                     let ends = vec![(point.x, low), (point.x, high)];
                     chart.draw_series([PathElement::new(

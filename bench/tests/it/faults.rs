@@ -127,23 +127,6 @@ fn the_memory_of_a_worker_that_sends_events_is_limited() {
 }
 
 #[test]
-#[cfg(unix)]
-fn an_item_that_ended_its_worker_runs_again_by_the_printed_command() {
-    let at = folder();
-    let line = format!(
-        "compare builtin:box:8 --counts-only --quiet --out {} --methods aborts --spheres 30 --samples 100",
-        at("out")
-    );
-    let (_, _, stderr) = run_program(faulty(), &words(&line));
-    let command = stderr.split('`').nth(1).unwrap_or_else(|| panic!("a command: {stderr}"));
-    assert!(command.starts_with("medial worker "), "{stderr}");
-    let again = format!("'{}' {}", faulty().display(), &command["medial ".len()..]);
-    let (code, stdout, stderr) = run_program("sh", &["-c", &format!("{again}; exit $?")]);
-    assert_eq!(code, 128 + 6, "{stdout}{stderr}");
-    assert!(stdout.contains("Preparing"), "{stdout}");
-}
-
-#[test]
 fn a_panic_of_the_command_is_a_failure_of_one_line() {
     let at = folder();
     // Of the command, where methods are listed, and of a method.

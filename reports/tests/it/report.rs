@@ -4,9 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use medial_reports::{
-    Header, Running, picture_strips, read_header, summary_text, write_report, write_site,
-};
+use medial_reports::{picture_strips, read_header, summary_text, write_report, write_site};
 use medial_run::record::{Record, Status};
 
 use super::common::{SHAPES, comparison, documents, failed, header, ok};
@@ -418,35 +416,6 @@ fn an_error_that_rises_with_the_count_is_marked() {
 }
 
 #[test]
-fn methods_that_did_not_run_are_listed_with_a_command() {
-    let folder = tempfile::tempdir().unwrap();
-    let records = comparison(&SHAPES[..2], &["qmat"], &COUNTS);
-    let page = |head: &Header| {
-        write_report(folder.path(), &records, head).unwrap();
-        let [page, _] = documents(&fs::read_to_string(folder.path().join("index.html")).unwrap());
-        (page["not_run"].clone(), page["running"].clone())
-    };
-    let ids = |not_run: &serde_json::Value| -> Vec<String> {
-        let methods = not_run["methods"].as_array().unwrap().iter();
-        methods.map(|method| method["id"].as_str().unwrap().to_owned()).collect()
-    };
-    let mut head = header(&["qmat", "angle", "tight"]);
-    head.runs[0].command =
-        "medial compare 'a b.off' --fresh --methods qmat --set qmat.k=1 --out x".to_owned();
-    let (not_run, running) = page(&head);
-    assert_eq!(ids(&not_run), ["angle", "tight"]);
-    assert_eq!(not_run["command"], "medial compare 'a b.off' --out x --methods angle,tight");
-    assert!(running.is_null());
-    head.running = Some(Running { done: 1, total: 2, missing: vec!["angle".to_owned()] });
-    let (not_run, running) = page(&head);
-    assert_eq!(ids(&not_run), ["tight"]);
-    head.runs.clear();
-    assert_eq!(page(&head).0["command"], "medial compare MESH --out DIR --methods tight");
-    assert_eq!(running, serde_json::json!({"done": 1, "total": 2, "missing": ["angle"]}));
-    assert!(page(&header(&["qmat"])).0.is_null(), "all methods ran");
-}
-
-#[test]
 fn captions_have_the_recorded_error_and_the_mesh_with_the_largest_spread_leads() {
     let mut records = vec![];
     // Methods differ most on the third one, which one of them did not run on.
@@ -552,8 +521,8 @@ fn every_link_of_a_site_resolves() {
         external.simplify.variant = Some("theirs, too".to_owned());
         records.push(external);
     }
-    // Of the two others one has no description, and one did not run.
-    let header = header(&[&names[..4], &["theirs, too", "not-run"]].concat());
+    // One other has no description.
+    let header = header(&[&names[..4], &["theirs, too"]].concat());
     let [store, site] = [(); 2].map(|()| tempfile::tempdir().unwrap());
     write_site(site.path(), store.path(), &records, &header).unwrap();
     assert_eq!(fs::read_dir(store.path()).unwrap().count(), 0, "the store stays unchanged");
@@ -564,10 +533,7 @@ fn every_link_of_a_site_resolves() {
         links.extend(local_addresses(html).into_iter().map(|link| (page.clone(), link)));
     }
     let [page, bulk] = documents(text(&files, "index.html"));
-    for method in [&page["methods"], &page["not_run"]["methods"]]
-        .into_iter()
-        .flat_map(|m| m.as_array().unwrap())
-    {
+    for method in page["methods"].as_array().unwrap() {
         let has_page =
             names.contains(&method["id"].as_str().unwrap()) || method["id"] == "theirs, too";
         assert_eq!(method["page"].is_string(), has_page, "{method}");
@@ -693,27 +659,6 @@ fn few_meshes_establish_nothing() {
     // The smallest count that ran is a bound, and the time of the fastest is in the column of the time.
     assert!(purpose.contains("| **tight** | at most 100 spheres | "), "{purpose}");
     assert!(purpose.contains("| fastest within 1 % error | **tight** | – | "), "{purpose}");
-}
-
-#[test]
-fn shares_of_targets_count_each_mesh_and_target() {
-    let records: Vec<Record> = SHAPES[..2]
-        .iter()
-        .enumerate()
-        .flat_map(|(shape, mesh)| {
-            [(200, 0.004), (100, 0.02)].map(|(n, e)| with_error(ok(mesh, "qmat", n, shape, 0), e))
-        })
-        .collect();
-    let files = report_of(&records);
-    let csv = text(&files, "tables/overview-profiles.csv");
-    // Of eight targets, 5, 3 and 2 % with 100 spheres, and 1 and 0.5 % with 200.
-    for row in [
-        "targets-spheres,qmat,100,0.375,16",
-        "targets-spheres,qmat,200,0.625,16",
-        "profile,qmat,1,1,2",
-    ] {
-        assert!(csv.contains(row), "{csv}");
-    }
 }
 
 #[test]
