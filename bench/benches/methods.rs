@@ -1,5 +1,5 @@
 //! Every registered method on two built-in shapes at three sizes: preparation and one level, without the shared
-//! substrates. Separately the initial medial mesh, which is one of these, and queries of a hierarchy.
+//! substrates. Separately the initial medial mesh, which is one of these, and what measuring a result costs.
 //!
 //! Every registered method appears here. `tight` takes seconds for each result: it runs only at the smallest size, with
 //! fewer samples and rounds than by default.
@@ -9,7 +9,8 @@ mod plan;
 use std::hint::black_box;
 
 use criterion::{BatchSize, BenchmarkId, Criterion, SamplingMode, criterion_group, criterion_main};
-use medial::complex::collapse::Hierarchy;
+use medial::complex::{MedialMesh, betti};
+use medial::metrics::{JudgeOptions, spikes, triangle_quality};
 use medial::shape::{Shape, ShapeOptions};
 use medial::simplifier::{Level, MedialSimplifier, Params, Registered, RunContext};
 use medial_run::input::{Input, Source};
@@ -97,26 +98,36 @@ fn substrates(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// A stage of a hierarchy as a mesh.
-fn hierarchy(criterion: &mut Criterion) {
-    let source = Source::BuiltIn { id: "blob".into(), resolution: None };
-    let input = Input::load(&source).expect("a built-in shape");
-    let shape = input.shape(ShapeOptions::default()).expect("an extent");
-    let pmat = medial_methods::find("pmat").expect("registered");
-    let run = RunContext::default();
-    let mut levels = pmat.prepare(&shape, &Params::none(), &run).expect("prepared");
-    let end = levels.at(Level::Spheres(1)).expect("the end");
-    let hierarchy = end.extras.get_shared::<Hierarchy>().expect("PMAT has a hierarchy");
-    let half = hierarchy.steps().len() / 2;
-    let mut group = criterion.benchmark_group("hierarchy");
-    group.bench_function("half as a mesh", |b| b.iter_with_large_drop(|| hierarchy.mesh(half)));
+/// Everything that the judge does, and its parts, on results of Q-MAT of three sizes.
+fn metrics(criterion: &mut Criterion) {
+    let (_, input) = built_in(("blob", 40));
+    let shape = shape(&input);
+    let qmat = medial_methods::find("qmat").expect("registered");
+    let mut levels =
+        qmat.prepare(&shape, &Params::none(), &RunContext::default()).expect("prepared");
+    let meshes: [MedialMesh; 3] =
+        [2000, 500, 100].map(|spheres| levels.at(Level::Spheres(spheres)).expect("a level").mesh);
+    // As `medial compare` measures.
+    let options = JudgeOptions { samples: 10_000, volume_depth: 5, ..JudgeOptions::default() };
+    let judge = shape.judge(None, options).expect("the shape has faces");
+    let mut group = criterion.benchmark_group("metrics");
+    for mesh in &meshes {
+        let name = |what| BenchmarkId::new(what, format!("{} spheres", mesh.spheres.len()));
+        group.bench_function(name("everything"), |b| b.iter(|| judge.evaluate(black_box(mesh))));
+        group.bench_function(name("distances"), |b| b.iter(|| judge.distances(black_box(mesh))));
+        group.bench_function(name("volume"), |b| b.iter(|| judge.volume_error(black_box(mesh))));
+        group.bench_function(name("topology"), |b| b.iter(|| betti(black_box(mesh))));
+        group.bench_function(name("quality and spikes"), |b| {
+            b.iter(|| (triangle_quality(black_box(mesh)), spikes(black_box(mesh))));
+        });
+    }
     group.finish();
 }
 
 criterion_group! {
     name = benches;
     config = plan::criterion();
-    targets = substrates, methods, hierarchy, tight
+    targets = substrates, methods, tight, metrics
 }
 
 criterion_main!(benches);

@@ -47,7 +47,7 @@ status=0
 printf '%-18s %9s %10s %10s %7s %9s %9s\n' points cells 'medial s' 'CGAL s' ratio 'medial MB' 'CGAL MB'
 for name in $sets; do
     file=$work/$name.f64
-    "$ours" make "$name" "$file"
+    scripts/oracles/points.py "$name" "$file"
     case $name in w:*) mode=weighted ;; *) mode= ;; esac
     cgal_mode=$mode
     if [ $threads = 2 ]; then cgal_mode=parallel; fi
@@ -55,7 +55,7 @@ for name in $sets; do
     : >"$work/b"
     i=0
     while [ $i -lt "$rounds" ]; do
-        "$ours" run "$file" $mode >>"$work/a"
+        "$ours" "$file" $mode >>"$work/a"
         "$work/delaunay_cgal" "$file" 1 $cgal_mode >>"$work/b"
         i=$((i + 1))
     done

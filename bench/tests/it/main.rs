@@ -2,7 +2,6 @@
 
 mod adapters;
 mod check;
-mod circles;
 mod cli;
 mod cli_compare;
 mod cli_simplify;

@@ -1,6 +1,7 @@
 //! The files that our oracles exchange with CGAL and Open3D: little-endian numbers without padding.
 
 use std::error::Error;
+use std::f64::consts::TAU;
 
 use medial::Vec3;
 use medial::surface::TriMesh;
@@ -79,4 +80,22 @@ pub fn points(numbers: &[f64]) -> Vec<Vec3> {
 /// CPU seconds of all threads of this process.
 pub fn cpu_seconds() -> f64 {
     cpu_time::ProcessTime::try_now().map_or(0.0, |t| t.as_duration().as_secs_f64())
+}
+
+/// A closed mesh of `2 n^2` triangles: a tube with bumps, bent to a ring.
+pub fn bumpy_torus(n: u32) -> TriMesh {
+    let angle = |k: u32| TAU * f64::from(k) / f64::from(n);
+    let point = |k: u32| {
+        let (u, v) = (angle(k / n), angle(k % n));
+        let tube = 0.35 + 0.05 * (5.0 * u).sin() * (4.0 * v).cos();
+        let ring = 1.0 + tube * v.cos();
+        Vec3::new(ring * u.cos(), ring * u.sin(), tube * v.sin())
+    };
+    let id = |i: u32, j: u32| i % n * n + j % n;
+    let sides = (0..n * n).flat_map(|k| {
+        let (i, j) = (k / n, k % n);
+        let [a, b, c, d] = [id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    });
+    TriMesh { vertices: (0..n * n).map(point).collect(), faces: sides.collect() }
 }

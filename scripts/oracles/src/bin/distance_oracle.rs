@@ -18,14 +18,11 @@
 //! and distance of the closest point, or one of 1, 0, -1 for inside, on, outside.
 #![allow(clippy::print_stdout)]
 
-#[path = "../../../../bench/benches/bumpy_torus/mod.rs"]
-mod bumpy_torus;
-
 use std::error::Error;
 
 use medial::Vec3;
 use medial::surface::{self, InsideTest, Side, SignedDistance, TriMesh, TriangleBvh};
-use medial_oracles::{Task, bytes, cpu_seconds, numbers};
+use medial_oracles::{Task, bumpy_torus, bytes, cpu_seconds, numbers};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -40,8 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn make(name: &str, count: usize, file: &str) -> Result<(), Box<dyn Error>> {
-    let mesh =
-        if name == "torus" { bumpy_torus::mesh(224, 224) } else { surface::read(name)?.mesh };
+    let mesh = if name == "torus" { bumpy_torus(224) } else { surface::read(name)?.mesh };
     let (lo, hi) = mesh.bounding_box().ok_or("the mesh has no vertices")?;
     let mut rng = Pcg64::seed_from_u64(1);
     let around = random(&mut rng, lo, hi, count);

@@ -1,4 +1,5 @@
-//! The predicates call by call, and triangulations of random and degenerate points.
+//! The predicates call by call, triangulations of random and degenerate points, unions of balls, and distances to a mesh
+//! and to a union of medial primitives.
 
 #![allow(missing_docs)]
 
@@ -8,11 +9,12 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use medial::Vec3;
-use medial::complex::UnionAxis;
+use medial::complex::{MedialMesh, MedialUnion, UnionAxis};
 use medial::geometry::delaunay::Delaunay;
 use medial::geometry::predicates::{circumsphere, in_sphere, orient3d};
 use medial::geometry::regular::Regular;
 use medial::geometry::{CellId, DualComplex, Poles, Sphere, UnionBoundary};
+use medial::surface::TriangleBvh;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -136,10 +138,44 @@ fn unions(c: &mut Criterion) {
     }
 }
 
+/// Distances of points inside the unit ball and on a bumpy surface around it.
+fn distances(c: &mut Criterion) {
+    let ball = medial_datasets::find("sphere").expect("a built-in shape").mesh(100);
+    let tree = TriangleBvh::new(&ball).expect("the sphere has faces");
+    let inside: Vec<Vec3> =
+        directions(20_000).into_iter().zip(cube(20_000)).map(|(d, t)| d * t.x).collect();
+    let mut group = c.benchmark_group("closest_point");
+    group.throughput(Throughput::Elements(inside.len() as u64));
+    group.bench_function("batch", |b| b.iter(|| tree.closest_batch(black_box(&inside))));
+    group.bench_function("build", |b| b.iter(|| TriangleBvh::new(black_box(&ball))));
+    group.finish();
+    // A ribbon through the points of a lattice.
+    let spheres = lattice(8, 0.25).into_iter().map(|p| Sphere::new(p - Vec3::ONE, 0.15)).collect();
+    let faces = (3..512).map(|k| [k - 3, k - 1, k]).collect();
+    let sheet = MedialMesh::from_simplices(spheres, vec![], faces).expect("a complex");
+    // 5,000 balls that nearly coincide, like the initial medial mesh of a sphere.
+    let ball = |p: Vec3| Sphere::new(1e-6 * p, 0.3 + 1e-6 * p.x);
+    let cloud = cube(5_000).into_iter().map(ball).collect();
+    let cloud = MedialMesh { spheres: cloud, ..MedialMesh::default() };
+    let points = surface(20_000);
+    let mut group = c.benchmark_group("union_distance");
+    group.throughput(Throughput::Elements(points.len() as u64));
+    for (name, mesh) in [("sheet", sheet), ("coincident", cloud)] {
+        let union = MedialUnion::new(&mesh).expect("it has spheres");
+        group.bench_function(BenchmarkId::new("signed", name), |b| {
+            b.iter(|| union.signed_batch(black_box(&points)));
+        });
+        group.bench_function(BenchmarkId::new("unsigned nearest", name), |b| {
+            b.iter(|| union.unsigned_nearest_batch(black_box(&points)));
+        });
+    }
+    group.finish();
+}
+
 criterion_group! {
     name = benches;
     config = plan::criterion();
-    targets = predicates, triangulations, unions
+    targets = predicates, triangulations, unions, distances
 }
 
 criterion_main!(benches);
