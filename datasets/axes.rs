@@ -11,10 +11,10 @@ use medial::complex::Sphere;
 use crate::bisectors::{KnownAxis, known, on_z, sagitta};
 use crate::profiles::{HOLED_HALF, around_hole};
 use crate::shapes::{
-    CAVITY, CHAIN, COIL, CORE_HALF, ELLIPSOID, HOLE, PAIR_BALL, PAIR_CAPSULE, ROD_APEX, ROD_HALF,
-    ROD_RADIUS, ROUNDING, TORUS, TUBE, TUBE_RADIUS, coil_centre, coil_length,
+    CAVITY, COIL, CORE_HALF, ELLIPSOID, HOLE, PAIR_BALL, PAIR_CAPSULE, ROD_APEX, ROD_HALF,
+    ROD_RADIUS, ROUNDING, TORUS, coil_centre, coil_length,
 };
-use crate::solids::{Curve, sin_cos_of_part, unit_sphere};
+use crate::solids::{sin_cos_of_part, unit_sphere};
 
 /// [`KnownAxis::parts`] of a shape.
 pub(crate) fn parts(id: &str) -> [usize; 3] {
@@ -265,22 +265,4 @@ pub(crate) fn holed_plate() -> KnownAxis {
     faces.extend((0..4).map(|k| [0, 2, 4].map(|ring| ring * sides + k * HOLED_SIDE)));
     // The longest arc is less than a third of the circle. Chords err in position, and as much in radius.
     known(spheres.collect(), vec![], faces, 1.5 * sagitta(HOLE + c, 3 * HOLED_SIDE))
-}
-
-/// The balls along the segment of their centres; radii are linear between neighbours.
-pub(crate) fn chain() -> KnownAxis {
-    path(CHAIN.map(|(z, radius)| on_z(z, radius)).to_vec(), 0.0)
-}
-
-/// The centre curve: its curvature is below one over the tube's radius, and it stays away from itself.
-pub(crate) fn tube() -> KnownAxis {
-    let Curve { start, end, place, .. } = TUBE;
-    let parts = 2 * CIRCLE_EDGES;
-    // The ends of the parts and, between them, their middles.
-    let shares = (0..=2 * parts).map(|i| f64::from(i) / f64::from(2 * parts));
-    let points: Vec<Vec3> = shares.map(|share| place(start + (end - start) * share)).collect();
-    let spheres = points.iter().step_by(2).map(|&point| Sphere::new(point, TUBE_RADIUS)).collect();
-    let chords = points.windows(3).step_by(2);
-    let sagging = chords.map(|p| p[1].distance(p[0].midpoint(p[2]))).fold(0.0, f64::max);
-    path(spheres, 2.0 * sagging)
 }

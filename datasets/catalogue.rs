@@ -9,8 +9,7 @@ use crate::bisectors::KnownAxis;
 use crate::profiles::{HOLED_HALF, triangle};
 use crate::shapes::{
     self, BLIND_HOLE, BLIND_HOLE_RADIUS, BOX_HALF, BRACKET, BRACKET_ELBOW, FILLETED_ELBOW, FRUSTUM,
-    PLATE_HALF, RIB, RIB_HALF, ROD_HALF, ROD_RADIUS, TUBE, TUBE_RADIUS, WEDGE, diagonal_of,
-    grid_box,
+    PLATE_HALF, RIB, RIB_HALF, ROD_HALF, ROD_RADIUS, WEDGE, diagonal_of, grid_box,
 };
 use crate::solids::capsule_of;
 
@@ -142,12 +141,6 @@ pub fn catalogue() -> Vec<BuiltIn> {
         "frustum", "Cone frustum", betti [1, 0, 0], resolution 34 from 10,
             shapes::frustum, Some(|| FRUSTUM.half_profile().revolved()), diagonal_of(shapes::FRUSTUM_EXTENT), false,
             "Radii 0.8 and 0.4, height 2, sharp creases; its axis is a segment and two cones.";
-        "chain", "Chain of balls", betti [1, 0, 0], resolution 40 from 12,
-            shapes::chain, Some(axes::chain), diagonal_of(shapes::CHAIN_EXTENT), false,
-            "Hull of four balls in a row; its axis is a segment, the radius linear between centres.";
-        "tube", "Swept tube", betti [1, 0, 0], resolution 44 from 20,
-            |edge| TUBE.tube(TUBE_RADIUS, edge), Some(axes::tube), diagonal_of(shapes::TUBE_EXTENT), false,
-            "Radius 0.22 about a curve of varying curvature, round ends; its axis is the curve.";
         "fillet", "Filleted bracket", betti [1, 0, 0], resolution 32 from 12,
             shapes::fillet, Some(|| FILLETED_ELBOW.profile().prism(BRACKET.y / 2.0, BRACKET.y / 2.0)), diagonal_of(shapes::BRACKET_EXTENT), false,
             "The bracket with a fillet of radius 0.3 in place of its reflex edge.";

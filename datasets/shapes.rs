@@ -10,8 +10,8 @@ use crate::profiles::{
     Elbow, Frustum, HOLED_HALF, Rib, across_elbow, around_hole, flat_triangle, strip,
 };
 use crate::solids::{
-    Curve, Piece, Ring, boundary, cap, capsule_of, divided, frequency, joined, mapped, mirrored,
-    parts, reversed, rings, stacks, surface, torus_grid, unit_sphere,
+    Ring, boundary, cap, capsule_of, divided, frequency, joined, mapped, mirrored, parts, reversed,
+    rings, stacks, surface, torus_grid, unit_sphere,
 };
 
 /// Semi-axes of the ellipsoid.
@@ -72,17 +72,6 @@ pub(crate) const BLIND_HOLE: Elbow = Elbow {
     fillet: 0.0,
     ends: false,
 };
-/// Heights and radii of the balls of the chain, from the top.
-pub(crate) const CHAIN: [(f64, f64); 4] = [(1.1, 0.25), (0.4, 0.55), (-0.4, 0.6), (-1.1, 0.3)];
-/// The curve of the tube, of largest curvature about 2, and the tube's radius.
-pub(crate) const TUBE: Curve = Curve {
-    start: -1.6,
-    end: 1.6,
-    place: |t| Vec3::new(t, 0.4 * (2.0 * t).sin(), 0.15 * (3.0 * t).cos()),
-    derivative: |t| Vec3::new(1.0, 0.8 * (2.0 * t).cos(), -0.45 * (3.0 * t).sin()),
-};
-pub(crate) const TUBE_RADIUS: f64 = 0.22;
-
 // Half the sides of bounding boxes, where they are not the dimensions themselves.
 
 pub(crate) const ROUNDED_EXTENT: Vec3 =
@@ -105,13 +94,6 @@ pub(crate) const RIB_EXTENT: Vec3 = Vec3::new(RIB.half, RIB_HALF, RIB.height / 2
 pub(crate) const FRUSTUM_EXTENT: Vec3 = Vec3::new(FRUSTUM.below, FRUSTUM.below, FRUSTUM.half);
 pub(crate) const BLIND_HOLE_EXTENT: Vec3 =
     Vec3::new(BLIND_HOLE_RADIUS, BLIND_HOLE_RADIUS, BLIND_HOLE.height / 2.0);
-/// The third ball is the largest.
-pub(crate) const CHAIN_EXTENT: Vec3 =
-    Vec3::new(CHAIN[2].1, CHAIN[2].1, (CHAIN[0].0 + CHAIN[0].1 - (CHAIN[3].0 - CHAIN[3].1)) / 2.0);
-/// The ends reach farthest along x; the crests of both waves farthest across.
-pub(crate) const TUBE_EXTENT: Vec3 =
-    Vec3::new(1.6 + TUBE_RADIUS, 0.4 + TUBE_RADIUS, 0.15 + TUBE_RADIUS);
-
 /// Bounding-box diagonals of the blended shapes, as measured on fine meshes.
 pub(crate) const DOUBLE_TORUS_DIAGONAL: f64 = 4.017;
 pub(crate) const FRAME_DIAGONAL: f64 = 3.166;
@@ -269,7 +251,7 @@ pub(crate) fn frustum(edge: f64) -> TriMesh {
     let Frustum { below, above, half } = FRUSTUM;
     // From the top pole down, as `surface` orients its faces.
     let corners = [(0.0, half), (above, half), (below, -half), (0.0, -half)];
-    surface(&rings(&Piece::between(&corners), edge))
+    surface(&rings(&corners, edge))
 }
 
 pub(crate) fn blind_hole(edge: f64) -> TriMesh {
@@ -277,26 +259,7 @@ pub(crate) fn blind_hole(edge: f64) -> TriMesh {
     let (outer, inner) = (BLIND_HOLE_RADIUS, BLIND_HOLE_RADIUS - leg);
     let corners =
         [(0.0, foot), (inner, foot), (inner, height), (outer, height), (outer, 0.0), (0.0, 0.0)];
-    surface(&rings(&Piece::between(&corners), edge))
-}
-
-/// Zones of the balls, joined by the cones that touch both neighbours. At `(z, r)` and `(z', r')` the cone touches
-/// where the normal has the angle `acos((r' - r) / (z - z'))` to the axis.
-pub(crate) fn chain(edge: f64) -> TriMesh {
-    let touches = CHAIN.windows(2).map(|pair| {
-        let [(z, radius), (next_z, next_radius)] = [pair[0], pair[1]];
-        ((next_radius - radius) / (z - next_z)).acos()
-    });
-    let angles: Vec<f64> = [0.0].into_iter().chain(touches).chain([TAU / 2.0]).collect();
-    let mut pieces: Vec<Piece> = Vec::new();
-    for (&(z, radius), ends) in CHAIN.iter().zip(angles.windows(2)) {
-        let zone = Piece::Zone { z, radius, from: ends[0], to: ends[1] };
-        if let Some(last) = pieces.last() {
-            pieces.push(Piece::Line { from: last.at(1.0), to: zone.at(0.0) });
-        }
-        pieces.push(zone);
-    }
-    surface(&rings(&pieces, edge))
+    surface(&rings(&corners, edge))
 }
 
 pub(crate) fn double_torus(edge: f64) -> TriMesh {

@@ -1,4 +1,4 @@
-//! Triangle meshes of solids: grid blocks, geodesic spheres, surfaces of revolution, tubes about curves, tori.
+//! Triangle meshes of solids: grid blocks, geodesic spheres, surfaces of revolution, tori.
 
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -272,51 +272,18 @@ pub(crate) fn mirrored(top: &[Ring], stacks: u32) -> Vec<Ring> {
     top.iter().copied().chain(between).chain(bottom).collect()
 }
 
-/// A part of a profile, which is divided evenly.
-#[derive(Clone, Copy)]
-pub(crate) enum Piece {
-    /// A segment; both ends as radius and z.
-    Line { from: (f64, f64), to: (f64, f64) },
-    /// An arc about `(0, z)`; the angles are those to the z axis.
-    Zone { z: f64, radius: f64, from: f64, to: f64 },
-}
-
-impl Piece {
-    /// The segments between corners.
-    pub(crate) fn between(corners: &[(f64, f64)]) -> Vec<Self> {
-        corners.windows(2).map(|pair| Self::Line { from: pair[0], to: pair[1] }).collect()
-    }
-
-    /// Radius and z at a share of the way.
-    pub(crate) fn at(&self, t: f64) -> (f64, f64) {
-        match *self {
-            Self::Line { from, to } => (between(from.0, to.0, t), between(from.1, to.1, t)),
-            Self::Zone { z, radius, from, to } => {
-                let (sin, cos) = between(from, to, t).sin_cos();
-                (radius * sin, z + radius * cos)
-            }
-        }
-    }
-
-    fn length(&self) -> f64 {
-        match *self {
-            Self::Line { from, to } => (to.0 - from.0).hypot(to.1 - from.1),
-            Self::Zone { radius, from, to, .. } => radius * (to - from),
-        }
-    }
-}
-
-/// The rings of a profile from pole to pole with edges of about `edge`: pieces in equal parts, and vertices of a
-/// ring in step with its radius.
-pub(crate) fn rings(pieces: &[Piece], edge: f64) -> Vec<Ring> {
-    let mut points = vec![pieces[0].at(0.0)];
-    for piece in pieces {
-        let n = parts(piece.length(), edge, 1);
-        points.extend((1..=n).map(|k| piece.at(share(k, n))));
+/// The rings of a profile from pole to pole with edges of about `edge`: the segments between corners, given by radius and
+/// z, in equal parts, and vertices of a ring in step with its radius.
+pub(crate) fn rings(corners: &[(f64, f64)], edge: f64) -> Vec<Ring> {
+    let mut points = vec![corners[0]];
+    for pair in corners.windows(2) {
+        let (from, to) = (pair[0], pair[1]);
+        let n = parts((to.0 - from.0).hypot(to.1 - from.1), edge, 1);
+        let at = |t: f64| (between(from.0, to.0, t), between(from.1, to.1, t));
+        points.extend((1..=n).map(|k| at(share(k, n))));
     }
     let last = points.len() - 1;
     let rings = points.into_iter().enumerate().map(|(i, (radius, z))| match i {
-        // A pole is exact, although the sine of pi is not.
         _ if i == 0 || i == last => Ring { count: 1, radius: 0.0, z },
         _ => Ring { count: SECTORS * parts(TAU * radius / f64::from(SECTORS), edge, 1), radius, z },
     });
@@ -341,65 +308,6 @@ pub(crate) fn sin_cos_of_part(i: u32, n: u32) -> (f64, f64) {
 /// The number of equal parts of about `edge` in `length`, at least `least`.
 pub(crate) fn parts(length: f64, edge: f64, least: u32) -> u32 {
     ((length / edge).round() as u32).max(least)
-}
-
-// Tubes about curves.
-
-/// A smooth curve, by its place and derivative at a parameter.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Curve {
-    pub(crate) start: f64,
-    pub(crate) end: f64,
-    pub(crate) place: fn(f64) -> Vec3,
-    pub(crate) derivative: fn(f64) -> Vec3,
-}
-
-/// Steps in which arc length is summed. Vertices lie on the tube for any error: it decides only how even
-/// the sections are.
-const LENGTH_STEPS: u32 = 4000;
-
-impl Curve {
-    fn parameter(&self, step: f64) -> f64 {
-        between(self.start, self.end, step / f64::from(LENGTH_STEPS))
-    }
-
-    /// Arc length from the start to each step, by the midpoint rule.
-    fn lengths(&self) -> Vec<f64> {
-        let width = (self.end - self.start) / f64::from(LENGTH_STEPS);
-        let mut sum = 0.0;
-        let mut lengths = vec![0.0];
-        for step in 0..LENGTH_STEPS {
-            sum += width * (self.derivative)(self.parameter(f64::from(step) + 0.5)).length();
-            lengths.push(sum);
-        }
-        lengths
-    }
-
-    /// The points within `radius` of the curve: a capsule bent along it. Sections stay in the planes normal to
-    /// the curve, turned so that one of their axes is normal to z.
-    ///
-    /// The curve is nowhere parallel to z; else its sections would have no such axis.
-    pub(crate) fn tube(&self, radius: f64, edge: f64) -> TriMesh {
-        let lengths = self.lengths();
-        let half = lengths[lengths.len() - 1] / 2.0;
-        mapped(capsule_of(half, radius, edge), |p| {
-            // Beyond its ends the curve goes on straight: the hemispheres stay round.
-            let along = p.z.clamp(-half, half);
-            let at = self.at_length(&lengths, along + half);
-            let tangent = (self.derivative)(at).normalize();
-            let level = tangent.cross(Vec3::Z).normalize();
-            let rest = tangent.cross(level);
-            (self.place)(at) + tangent * (p.z - along) + level * p.x + rest * p.y
-        })
-    }
-
-    /// The parameter at an arc length.
-    fn at_length(&self, lengths: &[f64], length: f64) -> f64 {
-        let after = lengths.partition_point(|&l| l <= length).clamp(1, lengths.len() - 1);
-        let (low, high) = (lengths[after - 1], lengths[after]);
-        let part = ((length - low) / (high - low)).clamp(0.0, 1.0);
-        self.parameter(after as f64 - 1.0 + part)
-    }
 }
 
 // The torus on a regular grid.

@@ -56,8 +56,6 @@ fn depth(id: &str, p: Vec3) -> f64 {
             in_polygon(&[[-half, 0.0], [half, 0.0], [0.0, 1.2]], p.x, p.z).min(0.8 - p.y.abs())
         }
         "frustum" => in_polygon(&[[-0.8, -1.0], [0.8, -1.0], [0.4, 1.0], [-0.4, 1.0]], rho, p.z),
-        "chain" => in_chain(rho, p.z),
-        "tube" => in_tube(p),
         "fillet" => {
             let inner = match (p.x < 0.7, p.z < 0.7) {
                 (true, true) => (p.x - 0.7).hypot(p.z - 0.7) - 0.3,
@@ -110,22 +108,6 @@ fn least(low: f64, high: f64, steps: u32, of: impl Fn(f64) -> f64) -> f64 {
         if of(lo + third) < of(hi - third) { hi -= third } else { lo += third }
     }
     of(lo)
-}
-
-/// By the planes that bound a convex solid: the one in each direction touches some ball.
-fn in_chain(rho: f64, z: f64) -> f64 {
-    let balls = [(1.1, 0.25), (0.4, 0.55), (-0.4, 0.6), (-1.1, 0.3)];
-    least(0.0, std::f64::consts::PI, 400, |angle| {
-        let (sin, cos) = angle.sin_cos();
-        let support = balls.iter().map(|(z, r)| z * cos + r).fold(f64::NEG_INFINITY, f64::max);
-        support - rho * sin - z * cos
-    })
-}
-
-/// By brute force over the curve.
-fn in_tube(p: Vec3) -> f64 {
-    let at = |t: f64| p.distance(Vec3::new(t, 0.4 * (2.0 * t).sin(), 0.15 * (3.0 * t).cos()));
-    0.22 - least(-1.6, 1.6, 300, at)
 }
 
 /// By brute force over the turns of the helix, then by ternary search about the best.
