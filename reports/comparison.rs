@@ -174,57 +174,6 @@ impl<'a> Comparison<'a> {
         here.collect()
     }
 
-    /// The best result of fewer spheres, if its Hausdorff error is below that of an entry by more than [`RISE`], among the
-    /// results of its method on its mesh at requested counts and error bounds.
-    pub(crate) fn better_with_fewer(&self, entry: &Entry<'_>) -> Option<&Entry<'a>> {
-        let point = |entry: &Entry<'_>| {
-            let record = entry.record;
-            let is_counted = entry.measured() && !record.simplify.level.is_native();
-            Some((reached(record).filter(|_| is_counted)? as f64, HAUSDORFF.of(record)?))
-        };
-        let own = point(entry)?;
-        let others = self.of_mesh(entry.mesh).filter(|other| other.series == entry.series);
-        let fewer = others.filter_map(|other| Some((point(other)?, other)));
-        let fewer = fewer.filter(|(other, _)| rises(own, &[*other]));
-        Some(fewer.min_by(|(a, _), (b, _)| a.1.total_cmp(&b.1).then(a.0.total_cmp(&b.0)))?.1)
-    }
-
-    /// The meaning of [`RISING`] for some entries: both results in words, the largest ratios first; `None` where no smaller
-    /// result is better.
-    pub(crate) fn rising_note<'e>(
-        &self,
-        entries: impl Iterator<Item = &'e Entry<'e>>,
-    ) -> Option<String> {
-        let mut found: Vec<(f64, String)> = entries
-            .filter_map(|entry| {
-                let fewer = self.better_with_fewer(entry)?;
-                let errors = [entry.record, fewer.record].map(|record| HAUSDORFF.of(record));
-                let [more, less] = [errors[0]?, errors[1]?];
-                let [many, few] =
-                    [entry, fewer].map(|e| grouped(reached(e.record).unwrap_or_default() as u64));
-                let mesh = match self.meshes.len() {
-                    1 => String::new(),
-                    _ => format!(" on {}", self.meshes[entry.mesh]),
-                };
-                let method = &self.series[entry.series];
-                let [more_text, less_text] = [more, less].map(|error| HAUSDORFF.format(error));
-                let text =
-                    format!("{method}{mesh}: {less_text} % with {few}, {more_text} % with {many}");
-                Some((less / more, text))
-            })
-            .collect();
-        found.sort_by(|a, b| a.0.total_cmp(&b.0)); // stable: equal ratios stay in the order of the tables
-        let left = found.len().saturating_sub(MOST_NAMED);
-        let named: Vec<String> = found.into_iter().take(MOST_NAMED).map(|(_, text)| text).collect();
-        let more = if left > 0 { format!("; and {left} more") } else { String::new() };
-        (!named.is_empty()).then(|| {
-            format!(
-                "†: a result with fewer spheres is better. Hausdorff error of {}{more}.",
-                named.join("; ")
-            )
-        })
-    }
-
     /// The requested sphere counts, with their level indices, from many to few.
     pub(crate) fn counts(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.levels.iter().enumerate().filter_map(|(index, level)| match level {
@@ -291,21 +240,6 @@ impl<'a> Comparison<'a> {
         }
         cautions
     }
-}
-
-/// An error that is larger than one of fewer spheres by more than this share is not monotone.
-const RISE: f64 = 0.05;
-
-/// The mark of such an error.
-pub(crate) const RISING: &str = " †";
-
-/// Results that the note on such errors names.
-const MOST_NAMED: usize = 4;
-
-/// Whether the error of a result is larger by more than 5 % than one of fewer spheres, among results of one method as
-/// numbers of spheres and errors.
-pub(crate) fn rises((spheres, error): (f64, f64), results: &[(f64, f64)]) -> bool {
-    results.iter().any(|&(fewer, least)| fewer < spheres && error > (1.0 + RISE) * least)
 }
 
 /// The record of the median Hausdorff error, where one without a result is infinite; of an even number the larger one.

@@ -6,7 +6,7 @@ use medial_run::record::Record;
 use medial_run::text::{counted, grouped, printable, shortened};
 
 use crate::answers::{equal_error_table, usual_level};
-use crate::comparison::{Comparison, RISING, reached, row_name};
+use crate::comparison::{Comparison, reached, row_name};
 use crate::header::MethodNote;
 use crate::metric::{FROZEN_SECONDS, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
 use crate::summary::{CountSummary, SeriesSummary, by_count};
@@ -40,12 +40,10 @@ pub(crate) fn overview_table(
     let error = |row: &SeriesSummary| row.mean(&HAUSDORFF).unwrap_or(f64::INFINITY);
     rows.sort_by(|a, b| error(a).total_cmp(&error(b))); // equal ones stay in order
     let mean = |row: &SeriesSummary, metric: &Metric| {
-        let rises = metric.key == HAUSDORFF.key && row.rising;
-        let mark = if rises { RISING } else { "" };
         let text = row.mean(metric).map(|mean| metric.format_mean(mean));
         // Means over fewer meshes do not compare with the others.
         let is_over_all = row.over == summary.meshes;
-        Cell::optional(text.map(|t| if is_over_all { t + mark } else { format!("({t}){mark}") }))
+        Cell::optional(text.map(|t| if is_over_all { t } else { format!("({t})") }))
     };
     let table = Table::of(&rows)
         .text("method", |row| comparison.series[row.series].as_str())
@@ -73,8 +71,6 @@ pub(crate) fn overview_table(
     if rows.iter().any(|row| row.over < summary.meshes) {
         notes.push("In parentheses: means over fewer meshes, which do not compare.".to_owned());
     }
-    let here = comparison.entries.iter().filter(|e| e.level == level && e.comparable());
-    notes.extend(comparison.rising_note(here));
     let edition = comparison.edition_note();
     let table = if edition.is_some() { table } else { table.without(&["frozen s"]) };
     let missing: Vec<String> =

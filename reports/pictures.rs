@@ -1,7 +1,7 @@
 //! Which results the pictures show side by side.
 //!
-//! For each mesh one strip: the results of all methods at the count of [`answers`](crate::answers), or at a smaller one
-//! that has a smaller error, with external results at their counts, the least error first, and a 3D view of the same.
+//! For each mesh one strip: the results of all methods at the count of [`answers`](crate::answers), with external results
+//! at their counts, the least error first, and a 3D view of the same.
 //! The caller has the surfaces and the medial meshes, which are not in the records.
 
 use std::collections::BTreeMap;
@@ -106,10 +106,6 @@ pub(crate) fn strips(comparison: &Comparison<'_>) -> BTreeMap<usize, PictureStri
         let mut shown: Vec<(f64, &Entry<'_>)> = (comparison.of_mesh(mesh))
             // A file of another program has one number of spheres, of any size.
             .filter(|entry| entry.level == level || entry.record.status == Status::External)
-            .map(|entry| {
-                let fewer = comparison.better_with_fewer(entry);
-                fewer.filter(|fewer| fewer.record.artifact.is_some()).unwrap_or(entry)
-            })
             .filter(|entry| entry.measured() && entry.record.artifact.is_some())
             .filter_map(|entry| Some((HAUSDORFF.of(entry.record)?, entry))) // a caption names it
             .collect();

@@ -15,7 +15,7 @@ use medial_run::level::Target;
 use medial_run::record::{Record, Status};
 use medial_run::text::{counted, grouped, significant, trimmed};
 
-use crate::comparison::{Comparison, Entry, RISING, level_label, reached};
+use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::header::Header;
 use crate::metric::{
     COMPLETENESS, GEOMETRIC, HAUSDORFF, LARGER_SIDE, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS,
@@ -54,8 +54,6 @@ pub(crate) struct SeriesSummary {
     /// Results with the Betti numbers of the solid, of those where both are known; over all meshes
     /// on which it reached the count.
     pub(crate) topology: (usize, usize),
-    /// Whether the error is above one of fewer spheres on any mesh.
-    pub(crate) rising: bool,
 }
 
 /// One method in relation to the reference, over the meshes that both reached.
@@ -238,7 +236,6 @@ fn at_count(
             intervals,
             ratio: ratio(&entries, &yardstick),
             topology: topology(&reached),
-            rising: reached.iter().any(|entry| comparison.better_with_fewer(entry).is_some()),
         });
     }
     CountSummary { count, meshes: meshes.len(), rows }
@@ -400,14 +397,8 @@ pub(crate) fn means_table(
         .text("on", |(_, row)| {
             Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes")))
         });
-    let rising_note = comparison.rising_note(comparison.entries.iter().filter(|e| e.comparable()));
     for metric in comparison.columns() {
-        rows = rows.number(metric.heading(), |(summary, row)| {
-            let mut cell = mean_cell(summary, row, metric);
-            let rises = metric.key == HAUSDORFF.key && row.rising;
-            cell.text.push_str(if rises { RISING } else { "" });
-            cell
-        });
+        rows = rows.number(metric.heading(), |(summary, row)| mean_cell(summary, row, metric));
     }
     rows = rows.text("topology right", |(_, row)| Cell::share(row.topology));
     rows = rows.text("without a result", |(_, row)| without_result(row));
@@ -427,7 +418,6 @@ pub(crate) fn means_table(
     Table {
         caption: MEANS.to_owned(),
         notes: (notes.into_iter().map(str::to_owned))
-            .chain(rising_note)
             .chain(comparison.seeds_note())
             .chain(comparison.edition_note())
             .collect(),

@@ -60,9 +60,6 @@ pub struct Arguments {
     /// Also run each method at its published level.
     #[arg(long)]
     published: bool,
-    /// Set a parameter of one method; repeatable.
-    #[arg(long = "set", value_name = "METHOD.KEY=VALUE")]
-    set: Vec<String>,
     /// Add medial meshes computed elsewhere as results of method NAME: a file, `NAME@MESH=FILE` with several
     /// meshes, or a folder of MESH.ma or MESH-COUNT.ma; repeatable. Their counts are the default of
     /// `--spheres`.
@@ -141,7 +138,7 @@ pub fn run(
         registry.add_plugins(&study.resolved(file)).map_err(Failure::usage)?;
     }
     registry.remarks.iter().for_each(|remark| note(global, remark));
-    arguments.apply_to_methods(&mut study, registry)?;
+    arguments.apply_levels(&mut study, registry)?;
     let provenance = provenance();
     let mut items = study.items(registry, &provenance)?;
     if arguments.substrate.as_is {
@@ -307,51 +304,30 @@ fn absolute(path: &PathBuf) -> PathBuf {
 }
 
 impl Arguments {
-    /// Applies `--set` and `--levels` to the methods of the study.
-    fn apply_to_methods(&self, study: &mut Study, registry: &Registry) -> Result<(), Failure> {
-        if self.set.is_empty() && self.levels.is_empty() {
+    /// Applies `--levels` to the methods of the study.
+    fn apply_levels(&self, study: &mut Study, registry: &Registry) -> Result<(), Failure> {
+        if self.levels.is_empty() {
             return Ok(());
         }
-        // Chains and defaults become rows, so that an option can name any of them.
+        // Chains and defaults become rows, so that the option can name any of them.
         study.methods = study.entries(registry)?.into_iter().map(|(method, _)| method).collect();
         study.after_filters.clear();
-        for word in &self.set {
-            let parts = word.split_once('=').and_then(|(name, value)| {
-                let (method, key) = name.split_once('.')?;
-                Some((method, key, value))
-            });
-            let (id, key, value) = parts.ok_or_else(|| {
-                Failure::usage(format!("--set {word}: expected METHOD.KEY=VALUE"))
-            })?;
-            for method in named(study, id, &format!("--set {word}"))? {
-                method.params.set(key, value);
-            }
-        }
         for word in &self.levels {
             let wrong =
                 || Failure::usage(format!("--levels {word}: expected METHOD=LEVEL[,LEVEL...]"));
             let (id, list) = word.split_once('=').ok_or_else(wrong)?;
             let levels = list.split(',').map(|level| level.trim().parse::<f64>());
             let levels: Vec<f64> = levels.collect::<Result<_, _>>().map_err(|_| wrong())?;
-            for method in named(study, id, &format!("--levels {word}"))? {
-                method.levels.extend(&levels);
+            let mut rows: Vec<_> = study.methods.iter_mut().filter(|row| row.id == id).collect();
+            if rows.is_empty() {
+                return Err(Failure::usage(format!(
+                    "--levels {word}: `{id}` does not run; add it by --methods"
+                )));
             }
+            rows.iter_mut().for_each(|row| row.levels.extend(&levels));
         }
         Ok(())
     }
-}
-
-/// All rows of a study with one method.
-fn named<'s>(
-    study: &'s mut Study,
-    id: &str,
-    option: &str,
-) -> Result<Vec<&'s mut StudyMethod>, Failure> {
-    let rows: Vec<_> = study.methods.iter_mut().filter(|method| method.id == id).collect();
-    if rows.is_empty() {
-        return Err(Failure::usage(format!("{option}: `{id}` does not run; add it by --methods")));
-    }
-    Ok(rows)
 }
 
 /// Prints the summary and decides the exit code.

@@ -324,10 +324,6 @@ impl Page<'_> {
             "brief": brief,
             "measured": entries().any(|entry| entry.measured()),
             "picture": part.picture,
-            "fewer": usual_level(comparison).and_then(|(level, _)| {
-                let note = comparison.rising_note(entries().filter(|entry| entry.level == level));
-                Some(note?.replace("†: a", "A"))
-            }),
             "view": view.map(|view| json!({"name": view.name, "file": format!("./{}", view.file)})),
             "initial": initial,
         })

@@ -49,7 +49,7 @@ const WORDS = [
 ];
 const UNITS = "Lengths in % of the bounding-box diagonal of the input; wall-clock seconds, shared substrates included. " +
   "Arrows point in the better direction. Bold: best for this mesh at this number of spheres, among results that reached it to " +
-  "within 2 %. †: the same method has a smaller error with fewer spheres, by more than 5 %. results.csv holds every " +
+  "within 2 %. results.csv holds every " +
   "recorded number.";
 const GLOSSARY = "https://github.com/medial-rs/medial/blob/main/METHODOLOGY.md#glossary";
 // Next to the page. The last two where there are means.
@@ -93,12 +93,12 @@ const listOf = (pairs) =>
 
 const strip = (mesh, link) => {
   if (!mesh.picture) return null;
-  const words = `${mesh.name}: medial meshes at one requested number of spheres (in parentheses: another number, which the method reached instead, or a smaller one at which its error is smaller), the least ` +
+  const words = `${mesh.name}: medial meshes at one requested number of spheres (in parentheses: another number, which the method reached instead), the least ` +
     "Hausdorff error (in % of the diagonal) first, coloured by radius. Below them the surface: red where the reconstruction reaches beyond it, blue " +
     "where it falls short. Errors beyond the scale have its last colour.";
   const image = make("img", { src: mesh.picture, alt: words });
   return make("figure", { class: "strip" }, make("div", {}, link ? make("a", { href: link }, image) : image),
-    make("figcaption", {}, words, mesh.fewer && make("strong", {}, ` ${mesh.fewer}`)));
+    make("figcaption", {}, words));
 };
 
 // Picture, 3D view, initial medial mesh and curves of one mesh.

@@ -9,8 +9,8 @@ const plotOf = (figure) => {
   const lay = (axis, value) => (figure[axis].scale === "log" ? Math.log(value) : value);
   const unlay = (axis, value) => (figure[axis].scale === "log" ? Math.exp(value) : value);
   const laid = ([x, y], more) => ({ u: lay("x", x), v: lay("y", y), x, y, ...more });
-  const points = figure.curves.flatMap((curve) => curve.points.map(([x, y, n, spheres, , isRising, bar]) =>
-    laid([x, y], { n, spheres, isRising, bar, curve })).filter(({ u, v }) => Number.isFinite(u) && Number.isFinite(v)));
+  const points = figure.curves.flatMap((curve) => curve.points.map(([x, y, n, spheres, , bar]) =>
+    laid([x, y], { n, spheres, bar, curve })).filter(({ u, v }) => Number.isFinite(u) && Number.isFinite(v)));
   const lines = figure.curves.flatMap((curve) => curve.points.map((at) => laid(at, { curve })));
   const tags = figure.curves.flatMap((curve) => curve.points.filter((point) => point[4] !== null)
     .map((point) => laid(point, { text: point[4], curve })));
@@ -48,13 +48,12 @@ const plotOf = (figure) => {
       ? visible : [...visible, tag]), []);
   };
 
-  const words = ({ x, y, n, spheres, isRising, bar, curve }) => {
+  const words = ({ x, y, n, spheres, bar, curve }) => {
     const format = (value) => value.toLocaleString("en", { maximumSignificantDigits: 4 });
     const of = n === null ? "" : `n = ${counted(n, "mesh", "meshes")}`;
     return [curve.name, [curve.of, of].filter(Boolean).join(", "), `${figure.x.title}: ${format(x)}`,
       `${figure.y.title}: ${format(y)}`, spheres === null ? "" : `spheres: ${format(spheres)}`,
-      bar ? `${n === 1 ? "range over seeds" : "95 % interval over meshes"}: ${bar.map(format).join(" to ")}` : "",
-      isRising ? "non-monotone: above the error of fewer spheres" : ""].filter(Boolean).join("\n");
+      bar ? `${n === 1 ? "range over seeds" : "95 % interval over meshes"}: ${bar.map(format).join(" to ")}` : ""].filter(Boolean).join("\n");
   };
 
   const box = make("figure", { class: "plot" });
@@ -82,7 +81,6 @@ const plotOf = (figure) => {
         Plot.ruleX(barred, { x: "u", y1: ({ bar }) => lay("y", bar[0]), y2: ({ bar }) => lay("y", bar[1]), stroke: colour, strokeOpacity: 0.5, clip: true }),
         Plot.line(dashed, { ...common, z, stroke: colour, strokeWidth: 2, strokeDasharray: "7 5" }),
         Plot.dot(seen, { ...common, symbol, stroke: colour, fill: hollow, r: 4, clip: false }),
-        Plot.dot(seen.filter((point) => point.isRising), { ...common, r: 7.5, stroke: "currentColor", strokeWidth: 1.2, clip: false }),
         Plot.text(apart(), { x: "u", y: "v", text: "text", dx: 7, dy: -7, textAnchor: "start", fontSize: 10 }),
         Plot.dot(chosen, { x: "u", y: "v", r: 9, stroke: "currentColor", strokeWidth: 2 }),
         Plot.tip(chosen, tip),
@@ -222,7 +220,6 @@ const plotOf = (figure) => {
     });
     legend.append(row);
   }
-  if (points.some((point) => point.isRising)) legend.append(make("span", { class: "rising" }, "non-monotone: error above that of fewer spheres"));
   const tools = make("div", { class: "tools" }, reset, button("−", "show more", () => zoom(0.5)), button("+", "enlarge", () => zoom(2)));
   stage.append(draw());
   box.append(make("figcaption", {}, figure.title, tools), stage, legend, announcement);

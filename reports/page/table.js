@@ -9,10 +9,9 @@ const resultsOf = (bulk) => {
     if (!column) return () => null;
     return (row) => column[row];
   };
-  const table = { mesh: columnOf("table/mesh"), series: columnOf("table/series"), best: columnOf("table/best"),
-    rising: columnOf("table/rising") };
+  const table = { mesh: columnOf("table/mesh"), series: columnOf("table/series"), best: columnOf("table/best") };
   const texts = {};
-  for (const key of ["asked", "status", "remark", "link", "topology", "repeat", "warnings"]) texts[key] = columnOf(`table/${key}`);
+  for (const key of ["asked", "status", "remark", "link", "topology", "warnings"]) texts[key] = columnOf(`table/${key}`);
   texts.mesh = (row) => report.meshes[table.mesh(row)].name;
   texts.method = (row) => report.series[table.series(row)].name;
   const numbers = { asked: columnOf("table/count"), spheres: columnOf("table/spheres"), edges: columnOf("simplify/edges"),
@@ -129,8 +128,7 @@ const resultsOf = (bulk) => {
     }
     if (!value) return make("td", {}, shown);
     const best = bit && table.best(row) & bit;
-    const mark = key === "hausdorff" && table.rising(row) ? " †" : null;
-    return make("td", { class: "num", "data-v": value(row) }, best ? make("strong", {}, shown) : shown, mark);
+    return make("td", { class: "num", "data-v": value(row) }, best ? make("strong", {}, shown) : shown);
   };
   const opened = new Map();
   const rowOf = (row) => {
@@ -189,10 +187,10 @@ const resultsOf = (bulk) => {
       if (!groups.has(title)) groups.set(title, []);
       groups.get(title).push([names.join(": ").replaceAll("_", " "), valueOf(value)]);
     }
-    const repeat = code(texts.repeat(row));
-    repeat.tabIndex = 0;
+    const command = code(columnOf("item/command")(row) ?? "");
+    command.tabIndex = 0;
     const sections = [...groups].map(([title, pairs]) => make("section", {}, make("h4", {}, title.replaceAll("_", " ")), listOf(pairs)));
-    const known = make("div", { class: "known" }, make("h4", {}, "Repeat this run"), repeat, make("div", { class: "groups" }, ...sections),
+    const known = make("div", { class: "known" }, make("h4", {}, "Command of the run"), command, make("div", { class: "groups" }, ...sections),
       note("As recorded: lengths as fractions of the diagonal, seconds, bytes."));
     return make("tr", { class: "detail" }, make("td", { colspan: columns.length }, known));
   };

@@ -9,7 +9,7 @@ mod svg;
 use medial_run::text::{grouped, significant};
 use serde_json::{Value, json};
 
-use crate::comparison::{Comparison, Entry, reached, rises};
+use crate::comparison::{Comparison, Entry, reached};
 use crate::metric::{
     COMPLETENESS, HAUSDORFF, LARGER_SIDE, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS,
 };
@@ -55,8 +55,6 @@ pub(crate) struct Point {
     pub(crate) spheres: Option<f64>,
     /// Text next to the point.
     pub(crate) tag: Option<String>,
-    /// Whether it is an error above one of fewer spheres.
-    pub(crate) rising: bool,
     /// The ends of a bar: a 95 % interval over meshes, or the range over seeds.
     pub(crate) bar: Option<[f64; 2]>,
 }
@@ -68,9 +66,8 @@ impl Figure {
         let curves = self.curves.iter().map(|curve| {
             let points = curve.points.iter().map(|point| {
                 let [x, y] = [point.x, point.y].map(rounded);
-                let is_rising = u8::from(point.rising);
                 let bar = point.bar.map(|ends| ends.map(rounded));
-                json!([x, y, point.n, point.spheres.map(rounded), point.tag, is_rising, bar])
+                json!([x, y, point.n, point.spheres.map(rounded), point.tag, bar])
             });
             json!({
                 "series": curve.series, "label": curve.label, "name": curve.name, "of": curve.of,
@@ -131,9 +128,8 @@ impl Kind {
         })
     }
 
-    /// A curve of results or means. Over time both
-    /// ends are tagged with their number of spheres, which no axis shows. Dashes are at native levels, where an error that
-    /// rises has no mark.
+    /// A curve of results or means. Over time both ends are tagged with their number of spheres, which no axis shows.
+    /// Dashes are at native levels.
     fn curve(
         &self,
         series: usize,
@@ -141,16 +137,11 @@ impl Kind {
         dashed: bool,
         points: impl IntoIterator<Item = Place>,
     ) -> Curve {
-        let points: Vec<Place> = points.into_iter().collect();
-        let mut errors: Vec<(f64, f64)> =
-            points.iter().filter_map(|place| Some((place.spheres, place.y?))).collect();
-        errors.retain(|_| self.is_error() && !dashed);
         let mut points: Vec<Point> = (points.into_iter())
             .filter_map(|Place { spheres, seconds, y, n, bar }| {
-                let rising = rises((spheres, y?), &errors);
                 let (x, spheres) =
                     if self.is_over_time() { (seconds?, Some(spheres)) } else { (spheres, None) };
-                Some(Point { x, y: y?, n: Some(n), spheres, tag: None, rising, bar })
+                Some(Point { x, y: y?, n: Some(n), spheres, tag: None, bar })
             })
             .collect();
         for k in [0, points.len().saturating_sub(1)] {

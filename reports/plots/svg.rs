@@ -59,8 +59,6 @@ fn colour(series: usize) -> RGBColor {
 /// The fonts that the texts of all figures name, the first one that is there.
 const FONTS: &str = "Helvetica, Arial, sans-serif";
 
-const RISING: &str = "non-monotone";
-
 /// Any error of plotters: only writing can fail, and a text takes everything.
 type Drawn = Result<(), Box<dyn Error>>;
 
@@ -94,7 +92,7 @@ impl Figure {
         area.draw(&Text::new(title, (28, 40), font(30, HPos::Left)))?;
         let (_, below) = area.split_vertically(68);
         let longest = self.curves.iter().map(|curve| legend_text(curve).chars().count()).max();
-        let legend_width = (88 + 14 * longest.unwrap_or(0).max(RISING.len()) as i32).min(460);
+        let legend_width = (88 + 14 * longest.unwrap_or(0).max(12) as i32).min(460);
         let (plot, legend) = below.split_horizontally(WIDTH - legend_width);
         let (x_ticks, y_ticks) = (x.ticks.len(), y.ticks.len());
         let mut chart = ChartBuilder::on(&plot)
@@ -143,9 +141,6 @@ impl Figure {
                 // Relative to the plot, without its margins.
                 let at = (left - inner.get_base_pixel().0, top - inner.get_base_pixel().1);
                 draw_marker(&inner, curve.series, at)?; // above its own line
-                if point.rising {
-                    inner.draw(&ring(at))?;
-                }
                 let free = point.tag.as_ref().and_then(|tag| free_place(at, tag, &mut taken));
                 if let (Some(tag), Some(at)) = (&point.tag, free) {
                     let text = Text::new(tag.clone(), at, font(20, HPos::Left));
@@ -170,17 +165,8 @@ impl Figure {
             area.draw(&Text::new(legend_text(curve), (62, y), font(24, HPos::Left)))?;
             y += LEGEND_ROW; // unlabelled curves take no row
         }
-        if self.curves.iter().flat_map(|curve| &curve.points).any(|point| point.rising) {
-            area.draw(&ring((24, y)))?;
-            area.draw(&Text::new(RISING, (62, y), font(24, HPos::Left)))?;
-        }
         Ok(())
     }
-}
-
-/// The mark of an error that rises with the number of spheres, around a marker.
-fn ring(at: (i32, i32)) -> Circle<(i32, i32), i32> {
-    Circle::new(at, 15, INK.stroke_width(2))
 }
 
 fn legend_text(curve: &Curve) -> String {

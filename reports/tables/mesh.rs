@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use medial::metrics::Evaluation;
 use medial_run::text::{betti, grouped, printable};
 
-use crate::comparison::{Comparison, Entry, RISING, level_label, reached};
+use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::metric::{COMPARED, HAUSDORFF, Metric};
 use crate::summary::pick;
 use crate::tables::{Cell, Table};
@@ -83,15 +83,7 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
     for metric in comparison.columns() {
         rows = rows.number(metric.heading(), |entry| match metric.of(entry.record) {
             Some(value) => {
-                let mark = if metric.key == HAUSDORFF.key
-                    && comparison.better_with_fewer(entry).is_some()
-                {
-                    RISING
-                } else {
-                    ""
-                };
-                let text = metric.format(value) + mark;
-                Cell { text, best: best.is_best(entry, metric, value) }
+                Cell { text: metric.format(value), best: best.is_best(entry, metric, value) }
             }
             None => Cell::optional(None),
         });
@@ -121,7 +113,6 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
         ));
     }
     notes.push(UNITS.to_owned());
-    notes.extend(comparison.rising_note(entries.iter()));
     notes.extend(comparison.seeds_note());
     notes.extend(comparison.edition_note());
     Table {

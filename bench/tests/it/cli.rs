@@ -124,7 +124,7 @@ fn wrong_arguments_exit_with_a_usage_error() {
     for line in [
         "compare builtin:nothing --methods nothing",
         "compare --spheres 0",
-        "compare --set qmat.k",
+        "compare --levels qmat",
         "simplify builtin:box --method qmat --spheres 5 --set no=1 -o x.ma",
         "simplify builtin:box --method angle --level 999 -o x.ma",
         "axis builtin:box --sampling red:5",

@@ -191,7 +191,7 @@ fn meshes_with_the_same_name_get_different_results() {
     let wrong: [(&[&str], i32); 9] = [
         (&["--samples", "99"], 2),
         (&["--study", &study], 2),
-        (&["--set", "qmat.k=x"], 2),
+        (&["--methods", "qmat:k=x"], 2),
         (&["--repeat", "0"], 2),
         (&["--repeat", "1000000000000"], 2),
         (&["--methods", "qmad"], 2),

@@ -390,32 +390,6 @@ fn the_initial_mesh_and_errors_above_5_percent_are_not_ranked() {
 }
 
 #[test]
-fn an_error_that_rises_with_the_count_is_marked() {
-    let errors = [(50, 0.02), (100, 0.01), (200, 0.0104), (500, 0.0106)];
-    let curve = errors.map(|(count, error)| with_error(ok("bear", "qmat", count, 0, 0), error));
-    let files = report_of(&curve);
-    for name in ["tables/mesh-bear.md", "tables/summary.md"] {
-        let table = text(&files, name);
-        let marked: Vec<&str> = table.lines().filter(|line| line.contains(" †")).collect();
-        assert_eq!(marked.len(), 1, "{name}: {table}");
-        assert!(marked[0].starts_with("| 500 |") && marked[0].contains("1.06 †"), "{name}");
-        let note = "†: a result with fewer spheres is better. Hausdorff error of qmat: 1.00 % with 100, 1.06 % with 500.";
-        assert!(table.contains(note), "{name}: {table}");
-    }
-    assert!(text(&files, "tables/summary.tex").contains("$\\dagger$"));
-    let [_, bulk] = documents(text(&files, "index.html"));
-    let rising = bulk["columns"]["table/rising"].as_array().unwrap();
-    assert_eq!(rising.iter().filter(|mark| !mark.is_null()).count(), 1);
-    let points = bulk["figures"][0][0]["curves"][0]["points"].as_array().unwrap();
-    let marked = points.iter().filter(|point| point[5] == 1).map(|point| point[0].as_f64());
-    assert_eq!(marked.collect::<Vec<_>>(), [Some(500.0)]);
-    assert!(text(&files, "plots/mesh-bear-hausdorff.svg").contains("non-monotone"));
-    let steady = report_of(&curve[..3]);
-    assert!(!text(&steady, "plots/mesh-bear-hausdorff.svg").contains("non-monotone"));
-    assert!(!text(&steady, "tables/mesh-bear.md").contains('†'));
-}
-
-#[test]
 fn captions_have_the_recorded_error_and_the_mesh_with_the_largest_spread_leads() {
     let mut records = vec![];
     // Methods differ most on the third one, which one of them did not run on.
@@ -443,56 +417,6 @@ fn captions_have_the_recorded_error_and_the_mesh_with_the_largest_spread_leads()
     write_report(folder.path(), &records, &header(&METHODS)).unwrap();
     let [page, _] = documents(&fs::read_to_string(folder.path().join("index.html")).unwrap());
     assert_eq!(page["leading"], 1, "b");
-}
-
-#[test]
-fn a_smaller_and_better_result_is_named_and_pictured() {
-    let pictured = |mut record: Record| {
-        let name = format!("axes/{}-{:?}.ma", record.simplify.method, record.simplify.level);
-        record.artifact = Some(name);
-        record
-    };
-    // For each method the errors at 50 and 100 spheres, and the one whose picture is shown.
-    let cases = [
-        ("qmat", [0.002, 0.009], 50),
-        ("angle", [0.02, 0.01], 100),
-        ("lambda", [0.0101, 0.0103], 100),
-    ];
-    let mut records = vec![];
-    for (method, errors, _) in cases {
-        for (count, error) in [50, 100].into_iter().zip(errors) {
-            records.push(pictured(with_error(ok("bear", method, count, 0, 0), error)));
-        }
-    }
-    let strips = picture_strips(&records);
-    let captions: Vec<&str> = strips[0].panels.iter().map(|(_, caption)| &**caption).collect();
-    let expected =
-        ["qmat (50): Hausdorff 0.200 %", "angle: Hausdorff 1.00 %", "lambda: Hausdorff 1.03 %"];
-    assert_eq!(captions, expected);
-    for ((artifact, _), (method, _, count)) in strips[0].panels.iter().zip(cases) {
-        assert!(artifact.starts_with(&format!("axes/{method}-Spheres({count})")), "{artifact}");
-    }
-    let sentence = " result with fewer spheres is better. Hausdorff error of qmat: 0.200 % with 50, 0.900 % with 100.";
-    let [page, _] = documents(text(&report_of(&records), "index.html"));
-    for place in [&page["meshes"][0]["fewer"], &page["overview"]["notes"]] {
-        assert!(place.to_string().contains(sentence), "{place}");
-    }
-    let printed = summary_text(&records, &[]).replace("\n  ", " ");
-    assert!(printed.contains(sentence), "{printed}");
-    // Without its medial mesh the smaller result has no picture.
-    records[0].artifact = None;
-    assert_eq!(picture_strips(&records)[0].panels[2].1, "lambda: Hausdorff 1.03 %");
-    assert!(
-        picture_strips(&records)[0].panels.iter().any(|panel| panel.1 == "qmat: Hausdorff 0.900 %")
-    );
-    // Many of them are counted.
-    let many: Vec<Record> = SHAPES[..6]
-        .iter()
-        .flat_map(|mesh| {
-            [(50, 0.01), (100, 0.02)].map(|(n, e)| with_error(ok(mesh, "qmat", n, 0, 0), e))
-        })
-        .collect();
-    assert!(summary_text(&many, &[]).replace("\n  ", " ").contains("; and 2 more."));
 }
 
 /// The addresses of a page's elements, without those of other hosts.
