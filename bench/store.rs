@@ -11,14 +11,13 @@ use std::{fs, io};
 
 use medial::{read_regular, read_regular_text};
 use medial_run::item::Item;
+pub use medial_run::journal::RESULTS;
 use medial_run::journal::{Journal, parse_records};
 use medial_run::level::Target;
 use medial_run::record::{Record, Status};
 
 use crate::exit::Failure;
 
-/// Name of the append-only list of records of a comparison.
-pub const RESULTS: &str = "results.jsonl";
 /// Name of the folder of the results as `.ma`.
 pub const AXES: &str = "axes";
 /// Name of the page of a report.

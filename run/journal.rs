@@ -13,6 +13,9 @@ use medial::{check_regular, parser_message, read_regular, write_atomically};
 use crate::error::FileError;
 use crate::record::Record;
 
+/// Name of the append-only list of records of a comparison, in its folder.
+pub const RESULTS: &str = "results.jsonl";
+
 /// An open `results.jsonl` that records are added to.
 #[derive(Debug)]
 pub struct Journal {

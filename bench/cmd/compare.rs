@@ -19,7 +19,7 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::output::{note, print_error, print_json, print_line};
 use crate::provenance::provenance;
-use crate::rebuild::{Rebuilt, RunReport, STUDY, of_items, write_study};
+use crate::rebuild::{Rebuilt, STUDY, of_items, report_of_run, write_study};
 use crate::store::{AXES, PAGE, RESULTS, Store};
 use crate::study::edition::{Edition, Mixed};
 use crate::study::external::ExternalResult;
@@ -65,8 +65,8 @@ pub struct Arguments {
     /// `--spheres`.
     #[arg(long, value_name = "NAME=PATH")]
     given: Vec<String>,
-    /// Show the frozen results of an edition next to the own ones without running its methods: a name such as
-    /// `2027.1`, or a folder.
+    /// Show the results of an edition, such as `2027.1`, or of another store next to the own ones without running their
+    /// methods.
     #[arg(long, value_name = "EDITION")]
     against: Option<PathBuf>,
     /// Time each item N times, alternating between methods, and report the median [default: 1].
@@ -183,9 +183,7 @@ pub fn run(
     }
     let levels: usize = left.iter().map(|item| item.levels.len()).sum();
     let (dir, registry) = (&arguments.out, &*registry);
-    let adds = levels > 0 || turns;
-    let report = RunReport { dir, registry, provenance: &provenance, items: &items, adds };
-    if adds {
+    if levels > 0 || turns {
         // An earlier page must not pass for a page of all records, even after a killed run.
         side.store.remove_page()?;
     }
@@ -203,7 +201,8 @@ pub fn run(
     ended?;
     // The store stays locked until its report is written; a worker would only hold memory.
     side.supervisors.clear();
-    let Rebuilt { records, files, undrawn, .. } = report.write()?;
+    let Rebuilt { records, files, undrawn, .. } =
+        report_of_run(dir, &items, registry, &provenance)?;
     undrawn.iter().for_each(|why| note(global, why));
     let records = of_items(records, &items);
     let shown: HashSet<String> = left.iter().flat_map(Item::keys).collect();

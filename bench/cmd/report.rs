@@ -1,32 +1,26 @@
 //! `medial report DIR [DIR ...] [--out DIR]`: rebuilds tables, plots and page from the records of a store, or of
 //! several stores that it merges.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use clap::Args;
-use medial::metrics::DEFINITIONS;
-use medial::{read_regular, shortened};
-use medial_reports::{Header, editions, read_header};
-use medial_run::hash::hex_digest;
+use medial::read_regular;
+use medial_reports::{Header, read_header};
 use medial_run::journal::write_records;
-use medial_run::level::Target;
 use medial_run::record::Record;
-use medial_run::settings::VOLUME_DEPTH;
 use serde_json::json;
 
 use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::files;
 use crate::output::print_result;
-use crate::provenance::provenance;
-use crate::rebuild::{Rebuilt, STUDY, of_items, rebuild, records, write_study};
-use crate::store::{AXES, PAGE, RESULTS, Store, artifact_path, claim, entries_of};
-use crate::study::edition::{Description, EditionMesh};
+use crate::rebuild::{Rebuilt, STUDY, rebuild, records, write_study};
+use crate::store::{PAGE, RESULTS, Store, artifact_path, claim, entries_of};
+use crate::study::Study;
 use crate::study::registry::Registry;
-use crate::study::{Study, unique_names};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -36,10 +30,6 @@ pub struct Arguments {
     /// Merge the stores into this folder; required for several stores.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Also write the results of the store's study as an edition for `compare --against` into this folder, which names
-    /// the edition.
-    #[arg(long, value_name = "DIR")]
-    freeze: Option<PathBuf>,
     /// Write a static site into this folder instead, and leave the store unchanged: the page, and a page for each method
     /// and mesh.
     #[arg(long, value_name = "DIR")]
@@ -84,9 +74,6 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
             .push(format!("{RESULTS}: removed an incomplete last line; its item has no record"));
     }
     warnings.extend(notes);
-    if let Some(edition) = &arguments.freeze {
-        freeze(dir, &records, edition, registry)?;
-    }
     drop(held);
     // The last record of a key counts; those of older builds have none.
     let keys: HashSet<&str> = records.iter().map(|record| &*record.key).collect();
@@ -200,125 +187,6 @@ fn merge(dirs: &[PathBuf], out: &Path) -> Result<Vec<String>, Failure> {
     files::write(&out.join("header.json"), &text)?;
     drop(store);
     Ok(notes)
-}
-
-/// Results of an edition that are kept as medial meshes, to be measured again by later builds.
-const KEPT: usize = 5;
-
-/// Writes the records of the study of a store as an edition.
-fn freeze(dir: &Path, records: &[Record], to: &Path, registry: &Registry) -> Result<(), Failure> {
-    // A store has the same folder for its results, which the next edition would replace.
-    if to.join(RESULTS).exists() {
-        return Err(Failure::at(to, "a folder of results; freeze into a folder of its own"));
-    }
-    let is_empty = fs::read_dir(to).map_or(true, |mut files| files.next().is_none());
-    if !is_empty && !to.join("edition.toml").exists() {
-        return Err(Failure::at(to, "not empty and no edition (expected a new folder)"));
-    }
-    let here = provenance();
-    let study = Study::read(&dir.join(STUDY))?;
-    let items = study.items(registry, &here)?;
-    let mut frozen = of_items(records.to_vec(), &items);
-    let all: usize = items.iter().map(|item| item.levels.len()).sum();
-    let fault = if frozen.len() < all {
-        let missing = all - frozen.len();
-        Some(format!(
-            "{missing} of {all} results are missing or of another build; run `medial compare` again"
-        ))
-    } else if items
-        .iter()
-        .any(|item| item.scene.noise.is_some() || item.method.fingerprint.is_some())
-    {
-        Some("its study has noise or plug-ins, which an edition cannot hold".to_owned())
-    } else {
-        None
-    };
-    if let Some(fault) = fault {
-        return Err(Failure::at(dir, fault));
-    }
-    let sources = study.sources()?;
-    let mesh = unique_names(&sources).into_iter().zip(&sources).map(|(name, source)| {
-        let item = items.iter().find(|item| item.scene.mesh == name);
-        let sha256 = item.and_then(|item| item.scene.hash.clone()).unwrap_or_default();
-        EditionMesh { name, source: source.to_string(), sha256 }
-    });
-    let mesh: Vec<EditionMesh> = mesh.collect();
-    let mut native: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-    for item in &items {
-        let levels = native.entry(item.method.label().to_owned()).or_default();
-        for level in &item.levels {
-            if let Target::Native(level) = level
-                && !levels.contains(level)
-            {
-                levels.push(*level);
-            }
-        }
-    }
-    native.retain(|_, levels| !levels.is_empty());
-    // Spread over meshes and methods; with few spheres they are small.
-    let coarsest = study.spheres.iter().min().map(|&count| Target::Spheres(count));
-    let mut coarse: Vec<&Record> = frozen.iter().collect();
-    coarse.retain(|record| Some(record.simplify.level) == coarsest && record.artifact.is_some());
-    let is_built_in = |record: &Record| record.dataset.as_deref() == Some("builtin");
-    if coarse.iter().any(|record| is_built_in(record)) {
-        // Everybody can measure these again.
-        coarse.retain(|record| is_built_in(record));
-    }
-    let coarse: Vec<&String> =
-        coarse.iter().filter_map(|record| record.artifact.as_ref()).collect();
-    let count = KEPT.min(coarse.len());
-    let kept: Vec<String> = (0..count).map(|k| coarse[k * coarse.len() / count].clone()).collect();
-    for record in &mut frozen {
-        // Without what only the store needs.
-        record.key.clear();
-        record.command.clear();
-        record.repetitions.clear();
-        record.evaluate_seconds = None;
-        record.artifact = record.artifact.take().filter(|artifact| kept.contains(artifact));
-    }
-    let machines: BTreeSet<String> = frozen.iter().map(|r| r.machine.to_string()).collect();
-    let packed = editions::pack(&frozen)?;
-    let mut spheres = study.spheres;
-    spheres.sort_unstable_by(|a, b| b.cmp(a));
-    let name = to.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let description = Description {
-        name,
-        metrics: DEFINITIONS,
-        version: here.version,
-        samples: study.samples,
-        volume_depth: VOLUME_DEPTH,
-        seed: study.seed,
-        sampling: study.sampling,
-        dual: study.dual,
-        certify: study.certify,
-        spheres,
-        max_error: study.max_error,
-        records: frozen.len(),
-        sha256: hex_digest(&packed),
-        machines: machines.into_iter().collect(),
-        native,
-        mesh,
-    };
-    let text = toml::to_string(&description).map_err(|error| Failure::at(to, error))?;
-    let inside = |folder: &Path, artifact: &String| {
-        let why = || format!("{}: not inside the folder", shortened(artifact));
-        artifact_path(folder, artifact).ok_or_else(|| Failure::at(folder, why()))
-    };
-    // Before the edition changes.
-    let read = kept.iter().map(|artifact| {
-        let from = inside(dir, artifact)?;
-        read_regular(&from).map_err(|error| Failure::at(&from, error))
-    });
-    let contents: Vec<Vec<u8>> = read.collect::<Result<_, _>>()?;
-    if to.join(editions::DESCRIPTION).exists() {
-        // Those of the edition that this one replaces.
-        let _ = fs::remove_dir_all(to.join(AXES));
-    }
-    for (artifact, bytes) in kept.iter().zip(contents) {
-        files::write(&inside(to, artifact)?, &bytes)?;
-    }
-    files::write(&to.join(editions::RECORDS), &packed)?;
-    files::write(&to.join(editions::DESCRIPTION), text.as_bytes())
 }
 
 /// Whether two records of one key hold the same result and the same measures.

@@ -1,41 +1,35 @@
 //! Editions: frozen results that new ones are compared against, without a run of their methods.
 //!
-//! An edition is known by its name if it is part of the program, or by its folder. Its rows are matched by the hash of the
+//! An edition is known by its name if it is part of the program; any other store serves as one by its folder. Its rows are matched by the hash of the
 //! mesh, not by its name, and by the level. Everything that decides a measured number must be the study's: the samples,
 //! the seed, the sampling of the start, and the version of the metrics' definitions.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use medial::complex::DualTriangulation;
 use medial::metrics::DEFINITIONS;
-use medial::read_regular;
-use medial::surface::Sampling;
-use medial_reports::editions::{DESCRIPTION, EDITIONS, Embedded, RECORDS, unpack};
-use medial_run::hash::hex_digest;
+use medial_reports::editions::{EDITIONS, Embedded, unpack};
 use medial_run::item::Item;
+use medial_run::journal::{RESULTS, read_records};
 use medial_run::level::Target;
-use medial_run::record::Record;
+use medial_run::record::{Conditions, Record};
 use medial_run::settings::VOLUME_DEPTH;
 use medial_run::text::did_you_mean;
 use medial_run::text::significant;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use serde_json::json;
 
 use crate::exit::Failure;
 use crate::study::registry::{INITIAL, Registry};
 use crate::study::{Study, parse_toml};
 
-/// The description of an edition: `edition.toml`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// What a comparison has to share with an edition: of `edition.toml`, or of the records of a store.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Description {
     /// Name, that of its folder.
     pub name: String,
     /// Version of the definitions of the metrics.
     pub metrics: u32,
-    /// Version of the program.
-    pub version: String,
     /// Surface samples of the evaluation.
     pub samples: usize,
     /// Levels of division of space for the volume difference.
@@ -43,31 +37,17 @@ pub struct Description {
     /// Seed of every random choice.
     pub seed: u64,
     /// Boundary samples of the start of all methods.
-    pub sampling: Sampling,
+    pub sampling: String,
     /// Triangulation of the dual Voronoi polygons.
-    pub dual: DualTriangulation,
-    /// Width of the certified intervals, a fraction of the diagonal.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub certify: Option<f64>,
+    pub dual: String,
     /// Sphere counts.
     pub spheres: Vec<usize>,
-    /// Error bounds, fractions of the diagonal.
-    pub max_error: Vec<f64>,
-    /// Number of records.
-    pub records: usize,
-    /// SHA-256 of the packed records.
-    pub sha256: String,
-    /// The machines of the seconds.
-    pub machines: Vec<String>,
-    /// Native levels of each method.
-    pub native: BTreeMap<String, Vec<f64>>,
     /// The meshes.
     pub mesh: Vec<EditionMesh>,
 }
 
 /// A mesh of an edition.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct EditionMesh {
     /// Name in the tables of the edition.
     pub name: String,
@@ -77,7 +57,7 @@ pub struct EditionMesh {
     pub sha256: String,
 }
 
-/// An edition whose records are those of its description.
+/// An edition: its description and its records.
 #[derive(Debug)]
 pub struct Edition {
     /// The description.
@@ -107,58 +87,75 @@ impl Edition {
         name.as_deref().map(Self::open).transpose()
     }
 
-    /// Opens an edition by its name or folder.
+    /// Opens an edition by its name, or a store by its folder.
     ///
     /// # Errors
-    /// Unless it is known, unaltered, and measured by no later definitions than those of this program.
+    /// When there is no such edition, or the store has no readable record.
     pub fn open(name: &Path) -> Result<Self, Failure> {
         let embedded = EDITIONS.iter().find(|edition| Path::new(edition.name) == name);
-        let file = |of: &str| embedded.map_or_else(|| name.join(of), |_| PathBuf::from(of));
-        let failed = |of: &str, message: String| Failure::at(&file(of), message);
-        let (text, packed) = match embedded {
-            Some(Embedded { description, records, .. }) => {
-                ((*description).to_owned(), records.to_vec())
+        match embedded {
+            Some(Embedded { name, description, records, .. }) => {
+                let failed = |why: String| Failure::input(format!("edition {name}: {why}"));
+                let records = unpack(records).map_err(|error| failed(error.to_string()))?.records;
+                Ok(Self { description: parse_toml(description).map_err(failed)?, records })
             }
-            None if !name.is_dir() => {
+            None if name.is_dir() => Self::of_store(name),
+            None => {
                 let known: Vec<&str> = EDITIONS.iter().map(|edition| edition.name).collect();
                 let name = name.display().to_string();
                 let meant = did_you_mean(&name, known.iter().copied());
                 let known = known.join(", ");
-                return Err(Failure::usage(format!(
-                    "--against {name}: unknown edition{meant} (expected a folder or one of: {known})"
-                )));
+                Err(Failure::usage(format!(
+                    "--against {name}: unknown edition{meant} (expected a store or one of: {known})"
+                )))
             }
-            None => {
-                let read = |of: &str| {
-                    let path = name.join(of);
-                    read_regular(path).map_err(|error| failed(of, error.to_string()))
-                };
-                let text = String::from_utf8(read(DESCRIPTION)?);
-                let text = text.map_err(|error| failed(DESCRIPTION, error.to_string()))?;
-                (text, read(RECORDS)?)
-            }
+        }
+    }
+
+    /// The records of a store that were measured like its last one: of each result the last.
+    fn of_store(folder: &Path) -> Result<Self, Failure> {
+        let mut records = read_records(&folder.join(RESULTS))?.records;
+        let Some(last) = records.last() else { return Err(Failure::at(folder, "no record")) };
+        let settings = |record: &Record| {
+            let Conditions { sampling, dual, samples, .. } =
+                record.conditions.clone().unwrap_or_default();
+            (sampling, dual, samples, record.seeds.get("evaluation").copied().unwrap_or_default())
         };
-        let description: Description =
-            parse_toml(&text).map_err(|message| failed(DESCRIPTION, message))?;
-        let (name, found) = (description.name.clone(), hex_digest(&packed));
-        if found != description.sha256 {
-            let expected = description.sha256;
-            return Err(Failure::input(format!(
-                "edition {name}: the records have changed (SHA-256 {found}, expected {expected}); restore {RECORDS}"
-            )));
-        }
-        if description.metrics > DEFINITIONS {
-            return Err(Failure::input(format!(
-                "edition {name}: the numbers have other definitions (found version {}, expected at most {DEFINITIONS}); use \
-                 a later build of medial or omit --against",
-                description.metrics
-            )));
-        }
-        let unpacked = unpack(&packed).map_err(|error| failed(RECORDS, error.to_string()))?;
-        if let Some(line) = unpacked.bad_lines.first() {
-            return Err(failed(RECORDS, line.to_string()));
-        }
-        Ok(Self { description, records: unpacked.records })
+        let of_all = settings(last);
+        let mut seen = BTreeSet::new();
+        records.reverse();
+        records.retain(|record| {
+            let Record { mesh_hash, simplify, .. } = record;
+            let (method, variant) = (&simplify.method, &simplify.variant);
+            let row = json!([mesh_hash, method, variant, simplify.params, simplify.level]);
+            settings(record) == of_all && seen.insert((row.to_string(), simplify.seed))
+        });
+        records.reverse();
+        let counts = records.iter().filter_map(|record| match record.simplify.level {
+            Target::Spheres(count) => Some(count),
+            _ => None,
+        });
+        let spheres: BTreeSet<usize> = counts.collect();
+        let meshes = records.iter().filter_map(|r| Some((r.mesh_hash.as_ref()?, &r.mesh)));
+        let meshes: BTreeMap<&String, &String> = meshes.collect();
+        let mesh = meshes.into_iter().map(|(hash, name)| EditionMesh {
+            name: name.clone(),
+            source: name.clone(),
+            sha256: hash.clone(),
+        });
+        let (sampling, dual, samples, seed) = of_all;
+        let description = Description {
+            name: folder.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            metrics: DEFINITIONS,
+            samples,
+            volume_depth: VOLUME_DEPTH,
+            seed,
+            sampling,
+            dual,
+            spheres: spheres.into_iter().rev().collect(),
+            mesh: mesh.collect(),
+        };
+        Ok(Self { description, records })
     }
 
     /// A note where the numbers have earlier definitions than those of this program.

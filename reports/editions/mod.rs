@@ -1,21 +1,13 @@
 //! Editions: frozen results that others compare against, part of the program.
 //!
 //! The folder of an edition holds `study.toml`, from which it is made, `edition.toml`, its description, and
-//! `records.jsonl.gz`, its records. The runner reads the description and checks the records against it.
+//! `records.jsonl.gz`, its records. `scripts/freeze.py` writes both.
 
 use std::io::{self, Read};
 
 use flate2::read::GzDecoder;
-use medial_run::error::FileError;
-use medial_run::journal::{Journaled, parse_records, to_line};
-use medial_run::record::Record;
+use medial_run::journal::{Journaled, parse_records};
 
-use crate::page::gzip;
-
-/// Name of the description of an edition in its folder.
-pub const DESCRIPTION: &str = "edition.toml";
-/// Name of its records.
-pub const RECORDS: &str = "records.jsonl.gz";
 /// Most bytes of the records of an edition, unpacked: a small file can unpack to any size.
 const MOST_BYTES: u64 = 1 << 28;
 
@@ -35,15 +27,6 @@ pub const EDITIONS: &[Embedded] = &[Embedded {
     description: include_str!("2027.1/edition.toml"),
     records: include_bytes!("2027.1/records.jsonl.gz"),
 }];
-
-/// Records as packed JSON lines; equal records are equal bytes.
-///
-/// # Errors
-/// When a record has no JSON form.
-pub fn pack(records: &[Record]) -> Result<Vec<u8>, FileError> {
-    let text = records.iter().map(to_line).collect::<Result<String, _>>()?;
-    Ok(gzip(text.as_bytes()))
-}
 
 /// The records of packed JSON lines.
 ///

@@ -5,9 +5,10 @@ use std::path::Path;
 
 use medial::metrics::{DEFINITIONS, JudgeOptions};
 use medial_bench::study::edition::{Description, Edition};
-use medial_reports::editions::{DESCRIPTION, EDITIONS, RECORDS, pack, unpack};
+use medial_reports::editions::EDITIONS;
 use medial_run::hash::hex_digest;
 use medial_run::input::{Input, Source};
+use medial_run::journal::{read_records, write_records};
 use serde_json::{Value, json};
 
 use crate::command::{done, folder, json, refused, words};
@@ -27,10 +28,7 @@ fn frozen_rows_are_matched_by_content_and_not_run() {
     let compare = |words: &[&str], out: &str| {
         done(&[&["compare"], words, &study[..], &["--out", &at(out)]].concat())
     };
-    compare(&[&surface, "builtin:sphere", "--methods", "qmat,angle"], "frozen");
-    done(&["report", &at("frozen"), "--freeze", &edition]);
-    // The next edition in the same folder would replace the results.
-    refused(&["report", &at("frozen"), "--freeze", &at("frozen")], 1, "a folder of results");
+    compare(&[&surface, "builtin:sphere", "--methods", "qmat,angle"], "test.1");
 
     let own = [&same, "builtin:box", "--methods", "qmat,qmat:k=0", "--against", &edition];
     let stdout = compare(&own, "own");
@@ -64,12 +62,10 @@ fn rows_of_other_versions_are_marked() {
     let compare = |words: &[&str], out: &str| {
         done(&[&["compare", "builtin:capsule"], words, &study[..], &["--out", &at(out)]].concat())
     };
-    compare(&["--methods", "qmat,pmat,angle,lambda"], "frozen");
-    done(&["report", &at("frozen"), "--freeze", &edition]);
+    compare(&["--methods", "qmat,pmat,angle,lambda"], "test.1");
     // `qmat` with another error and `angle` are of other versions; `pmat` is of another one with the same result.
-    let [description, packed] = [DESCRIPTION, RECORDS].map(|name| format!("{edition}/{name}"));
-    let bytes = fs::read(&packed).expect("records");
-    let mut records = unpack(&bytes).expect("records").records;
+    let results = at("test.1/results.jsonl");
+    let mut records = read_records(Path::new(&results)).expect("records").records;
     for record in &mut records {
         if record.simplify.method != "lambda" {
             record.method_version = "0".repeat(64);
@@ -79,11 +75,7 @@ fn rows_of_other_versions_are_marked() {
             record.evaluate.as_mut().expect("measured").distances.hausdorff /= 2.0;
         }
     }
-    let altered = pack(&records).expect("packed");
-    let text = fs::read_to_string(&description).expect("a description");
-    fs::write(&description, text.replace(&hex_digest(&bytes), &hex_digest(&altered)))
-        .expect("written");
-    fs::write(&packed, altered).expect("written");
+    write_records(Path::new(&results), &records).expect("written");
 
     let stdout = compare(&["--methods", "qmat,pmat", "--against", &edition], "own");
     let page = fs::read_to_string(at("own/index.html")).expect("a page");
@@ -110,8 +102,7 @@ fn editions_that_do_not_compare_are_refused_before_any_run() {
     let edition = at("test.1");
     let frozen =
         "compare builtin:capsule --methods pmat --spheres 20 --samples 500 --counts-only -q --out";
-    done(&[&words(frozen)[..], &[&at("frozen")]].concat());
-    done(&["report", &at("frozen"), "--freeze", &edition]);
+    done(&[&words(frozen)[..], &[&edition]].concat());
     let against = |line: &str, code: i32, message: &str| {
         let line = format!("compare {line} --methods pmat --spheres 20 --out {}", at("own"));
         refused(&words(&line), code, message);
@@ -123,22 +114,8 @@ fn editions_that_do_not_compare_are_refused_before_any_run() {
     against(&seeded, 2, "--seed 1: edition test.1");
     against(&named("builtin:box --samples 500"), 2, "no mesh of this comparison");
     against("builtin:capsule --against 2027.11", 2, "did you mean `2027.1`?");
-    let [description, records] = [DESCRIPTION, RECORDS].map(|name| format!("{edition}/{name}"));
-    let text = fs::read_to_string(&description).expect("a description");
-    let equal = named("builtin:capsule --samples 500");
-    // One digit more is a later version.
-    fs::write(&description, text.replace("metrics = ", "metrics = 9")).expect("written");
-    against(
-        &equal,
-        1,
-        &format!("the numbers have other definitions (found version 9{DEFINITIONS}, "),
-    );
-    fs::write(&description, text.replace("metrics = ", "measures = ")).expect("written");
-    against(&equal, 1, "edition.toml: line ");
-    fs::write(&description, &text).expect("written");
-    let packed = fs::read(&records).expect("records");
-    fs::write(&records, &packed[..packed.len() / 2]).expect("written");
-    against(&equal, 1, "the records have changed");
+    fs::write(at("test.1/results.jsonl"), "").expect("written");
+    against(&named("builtin:capsule --samples 500"), 1, "test.1: no record");
 }
 
 #[test]
@@ -148,6 +125,9 @@ fn stored_results_have_the_numbers_of_their_edition() {
             format!("{}/../reports/editions/{}", env!("CARGO_MANIFEST_DIR"), embedded.name);
         assert!(embedded.records.len() < 4 << 20, "{} bytes", embedded.records.len());
         let edition = Edition::open(Path::new(embedded.name)).expect("an edition");
+        let hash = format!("sha256 = \"{}\"", hex_digest(embedded.records));
+        assert!(embedded.description.contains(&hash), "the records have changed");
+        assert!(edition.description.metrics <= DEFINITIONS);
         if edition.description.metrics < DEFINITIONS {
             continue;
         }
