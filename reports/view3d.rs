@@ -1,25 +1,16 @@
 //! The 3D views of the page: a surface and the medial meshes of its results.
 //!
 //! A view is a script file of one call, so that a page that was opened from a disk can load it:
-//! browsers let it load scripts from there, and nothing else. Its text is gzip in Base64 of
-//!
-//! | bytes | what |
-//! |---|---|
-//! | 4 | length of the head, little-endian as all that follows |
-//! | head | JSON, the meaning of the arrays; filled up with spaces to a multiple of four |
-//! | `u32` | faces of the surface, three vertices each, as differences from the number before |
-//! | for each result | spheres, four `f32` each; edges, two `u32` each; faces, three `u32` each; seams, two `u32` for each edge; junctions, one `u32` each |
-//! | `u16` | vertices of the surface, in steps from the lowest corner |
-//! | for each result | one byte for each vertex: its signed error, 128 for none; one byte for each face: the colour of its sheet |
+//! browsers let it load scripts from there, and nothing else. Its text is JSON as gzip in Base64.
 //!
 //! Coarse surfaces are refined without changing their shape, because errors belong to vertices; very
 //! fine ones are coarsened.
 
 use std::collections::HashMap;
 
-use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, SheetGraph, SheetOptions};
 use medial::surface::TriMesh;
+use medial_run::text::significant;
 use serde_json::json;
 
 use crate::page::{pack, page_of_view};
@@ -100,16 +91,40 @@ impl<'a> View3d<'a> {
         let colours = maps.map(|map| {
             (0..COLOURS).map(|k| map.at(k as f64 / (COLOURS - 1) as f64)).collect::<Vec<_>>()
         });
-        let results = self.results.iter().zip(&self.graphs).map(|((label, axis), graph)| {
-            let counts = [axis.spheres.len(), axis.edges.len(), axis.faces.len()];
-            let seams = seams(graph).count();
-            let sizes = [graph.areas.len(), graph.seams.len(), graph.junctions.len()];
-            json!({"label": label, "counts": counts, "seams": seams, "structure": sizes})
+        let results = self.results.iter().zip(&self.graphs).zip(errors);
+        let results = results.map(|(((label, axis), graph), errors)| {
+            let spheres = axis.spheres.iter().flat_map(|sphere| {
+                let [x, y, z] = sphere.centre.to_array();
+                // More digits than a browser draws.
+                [x, y, z, sphere.radius]
+                    .map(|number| significant(number, 7).parse().unwrap_or(number))
+            });
+            let sheets = graph.sheet_of_face.iter().map(|&sheet| SheetGraph::colour(sheet));
+            let seams: Vec<&[u32; 2]> = graph.seams.iter().flat_map(|seam| &seam.edges).collect();
+            json!({
+                "label": label,
+                "structure": [graph.areas.len(), graph.seams.len(), graph.junctions.len()],
+                "spheres": spheres.collect::<Vec<f64>>(),
+                "edges": axis.edges.as_flattened(),
+                "faces": axis.faces.as_flattened(),
+                "seams": seams.into_iter().flatten().collect::<Vec<_>>(),
+                "junctions": graph.junctions,
+                "errors": errors.iter().map(|error| byte_of(error / end)).collect::<Vec<u8>>(),
+                "sheets": sheets.map(|c| (255.0 * c).round() as u8).collect::<Vec<u8>>(),
+            })
         });
-        let head = json!({
+        let places = surface.vertices.iter().flat_map(|&vertex| {
+            let steps = ((vertex - low) / step.max(f64::MIN_POSITIVE)).round().to_array();
+            steps.map(|steps| steps as u16)
+        });
+        let mut last = 0;
+        let faces = surface.faces.as_flattened().iter().map(|&vertex| {
+            // Small differences pack well.
+            i64::from(vertex) - i64::from(std::mem::replace(&mut last, vertex))
+        });
+        let view = json!({
             "direction": camera.direction.to_array(),
             "up": camera.up.to_array(),
-            "surface": [surface.vertices.len(), surface.faces.len()],
             "low": low.to_array(),
             "step": step,
             "diagonal": diagonal,
@@ -117,50 +132,13 @@ impl<'a> View3d<'a> {
             "largest_error": 100.0 * end / diagonal,
             "radii": [radii.lo, radii.hi],
             "colours": colours,
+            // In steps from the lowest corner; faces as differences from the number before.
+            "vertices": places.collect::<Vec<u16>>(),
+            "faces": faces.collect::<Vec<i64>>(),
             "results": results.collect::<Vec<_>>(),
         });
-        let mut head = head.to_string().into_bytes();
-        // The browser reads the arrays in place, which must begin at a multiple of four.
-        head.resize(head.len().next_multiple_of(4), b' ');
-        let mut bytes = (head.len() as u32).to_le_bytes().to_vec();
-        bytes.append(&mut head);
-        self.arrays(surface, (low, step), &mut bytes);
-        for (values, graph) in errors.iter().zip(&self.graphs) {
-            bytes.extend(values.iter().map(|error| byte_of(error / end)));
-            let colours = graph.sheet_of_face.iter().map(|&sheet| SheetGraph::colour(sheet));
-            bytes.extend(colours.map(|colour| (255.0 * colour).round() as u8));
-        }
-        pack(&bytes)
+        pack(view.to_string().as_bytes())
     }
-
-    /// Everything but the errors.
-    fn arrays(&self, surface: &TriMesh, (low, step): (Vec3, f64), bytes: &mut Vec<u8>) {
-        let mut last = 0_u32;
-        for &vertex in surface.faces.iter().flatten() {
-            // Small differences pack well.
-            bytes.extend(vertex.wrapping_sub(last).to_le_bytes());
-            last = vertex;
-        }
-        for ((_, axis), graph) in self.results.iter().zip(&self.graphs) {
-            for sphere in &axis.spheres {
-                let [x, y, z] = sphere.centre.to_array();
-                let numbers = [x, y, z, sphere.radius].map(|number| (number as f32).to_le_bytes());
-                bytes.extend(numbers.as_flattened());
-            }
-            let vertices = axis.edges.as_flattened().iter().chain(axis.faces.as_flattened());
-            let vertices = vertices.chain(seams(graph).flatten()).chain(&graph.junctions);
-            bytes.extend(vertices.flat_map(|vertex| vertex.to_le_bytes()));
-        }
-        for &vertex in &surface.vertices {
-            let steps = ((vertex - low) / step.max(f64::MIN_POSITIVE)).round().to_array();
-            bytes.extend(steps.map(|steps| (steps as u16).to_le_bytes()).as_flattened());
-        }
-    }
-}
-
-/// The edges of all seams.
-fn seams(graph: &SheetGraph) -> impl Iterator<Item = &[u32; 2]> {
-    graph.seams.iter().flat_map(|seam| &seam.edges)
 }
 
 /// An error as a byte: 128 for none, 1 and 255 for the ends and all beyond.
@@ -253,6 +231,7 @@ mod tests {
     use super::*;
     use base64::Engine;
     use base64::prelude::BASE64_STANDARD;
+    use medial::Vec3;
     use medial::complex::Sphere;
 
     fn tetrahedron() -> TriMesh {
@@ -319,11 +298,13 @@ mod tests {
             &mut bytes,
         )
         .unwrap();
-        let length = u32::from_le_bytes(bytes[..4].try_into().unwrap()) as usize;
-        assert_eq!(length % 4, 0);
-        let head: serde_json::Value = serde_json::from_slice(&bytes[4..4 + length]).unwrap();
-        let [vertices, faces] = [0, 1].map(|k| head["surface"][k].as_u64().unwrap() as usize);
-        assert_eq!(head["results"][0]["counts"], serde_json::json!([2, 1, 0]));
-        assert_eq!(bytes.len(), 4 + length + 12 * faces + 2 * 16 + 8 + 6 * vertices + vertices);
+        let view: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
+        let [vertices, faces] =
+            ["vertices", "faces"].map(|key| view[key].as_array().unwrap().len());
+        assert_eq!(vertices % 3 + faces % 3, 0);
+        let result = &view["results"][0];
+        let lengths = ["spheres", "edges", "faces", "errors", "sheets"]
+            .map(|key| result[key].as_array().unwrap().len());
+        assert_eq!(lengths, [8, 2, 0, vertices / 3, 0]);
     }
 }

@@ -5,8 +5,7 @@
 //! 2. **Deterministic values** (`results`): results, errors, counts, topology. Compared exactly; every change is
 //!    listed, and is a regression if it is for the worse by more than its threshold.
 //! 3. **Seconds** (`timing`): the same work takes other seconds each time. A slowdown in CPU seconds is reported as a
-//!    regression only if its confidence interval lies beyond a threshold, and the repetitions agree. Wall-clock seconds
-//!    are shown, but never are a regression.
+//!    regression only if its confidence interval lies beyond a threshold, and the repetitions agree.
 
 pub(crate) mod results;
 pub(crate) mod text;

@@ -186,7 +186,6 @@ fn timing_table(diff: &Diff) -> Table {
     let rows = Table::of(&diff.timings)
         .text("method", |timing| timing.method.clone())
         .text("mesh", |timing| timing.mesh.clone().unwrap_or_else(|| "all".to_owned()))
-        .text("clock", |timing| timing.clock)
         .text("results × repetitions", |t| format!("{} × {}", t.results, t.repetitions))
         .text("new ÷ old", |timing| format!("{:.3}", timing.ratio))
         .text("99 % interval", |t| format!("{:.3} to {:.3}", t.interval[0], t.interval[1]))

@@ -15,13 +15,12 @@
 //! With builds that ran alternately, repetition `k` of one is compared with repetition `k` of the other, since load
 //! on the machine slows both. Otherwise a busier machine looks like a slower program.
 //!
-//! The method's own time counts. Shared substrates have a separate row. Wall-clock seconds are shown, but never are a
-//! regression.
+//! The method's own time counts. Shared substrates have a separate row.
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 
-use medial_run::record::{Record, Repetition, Stages};
+use medial_run::record::{Record, Stages};
 use serde::Serialize;
 
 use super::results::Pair;
@@ -50,29 +49,19 @@ pub struct Timing {
     pub method: String,
     /// The mesh of the row; `None` for the row over all meshes.
     pub mesh: Option<String>,
-    /// `cpu` or `wall`.
-    pub clock: &'static str,
     /// Results that it is taken over.
     pub results: usize,
     /// Repetitions of each side.
     pub repetitions: usize,
     /// New over old seconds, the geometric mean.
     pub ratio: f64,
-    /// The interval of this ratio: all of one clock hold together with a probability of 99 %.
+    /// The interval of this ratio: all hold together with a probability of 99 %.
     pub interval: [f64; 2],
     /// Share of the repetitions that are on the same side of 1 as the ratio.
     pub agreement: f64,
     /// Regression or improvement; `None` within the threshold, or if not certain.
     pub meaning: Option<Meaning>,
 }
-
-/// The clocks, and whether a change by them means anything: other programs disturb the clock on the wall, so it is shown
-/// and never a gate.
-const CLOCKS: [(&str, Clock, bool); 2] =
-    [("cpu", |r| r.cpu_seconds, true), ("wall", |r| r.seconds, false)];
-
-/// Stages of a repetition by a clock.
-type Clock = fn(&Repetition) -> Stages;
 
 /// The compared part of the time.
 type Part = fn(&Stages) -> f64;
@@ -85,7 +74,7 @@ struct Group<'p, 'a> {
     pairs: Vec<&'p Pair<'a>>,
 }
 
-/// A row for each method over all meshes by each clock, and rows for single meshes with a regression or an
+/// A row for each method over all meshes, and rows for single meshes with a regression or an
 /// improvement. And the reasons why some seconds were not compared.
 pub(super) fn timings(pairs: &[Pair<'_>], options: &DiffOptions) -> (Vec<Timing>, Vec<String>) {
     let mut untimed = Vec::new(); // reasons, in the order of the checks
@@ -109,9 +98,7 @@ pub(super) fn timings(pairs: &[Pair<'_>], options: &DiffOptions) -> (Vec<Timing>
     }
     let groups = groups(&repeated);
     let error_rate = ERROR_RATE / groups.len() as f64;
-    let rows = groups.iter().flat_map(|group| {
-        CLOCKS.iter().filter_map(move |clock| group.timing(clock, options, error_rate))
-    });
+    let rows = groups.iter().filter_map(|group| group.timing(options, error_rate));
     // Rows of single meshes without a finding would bury the others.
     (rows.filter(|row| row.mesh.is_none() || row.meaning.is_some()).collect(), untimed)
 }
@@ -167,26 +154,20 @@ fn groups<'p, 'a>(pairs: &[&'p Pair<'a>]) -> Vec<Group<'p, 'a>> {
 }
 
 fn cpu_of_substrates(record: &Record) -> f64 {
-    let seconds = seconds(record, |repetition| repetition.cpu_seconds, |stages| stages.substrate);
-    median(&seconds).unwrap_or(0.0)
+    median(&seconds(record, |stages| stages.substrate)).unwrap_or(0.0)
 }
 
-/// A time of each repetition of a record.
-fn seconds(record: &Record, clock: Clock, part: Part) -> Vec<f64> {
-    record.repetitions.iter().map(|repetition| part(&clock(repetition))).collect()
+/// CPU seconds of each repetition of a record.
+fn seconds(record: &Record, part: Part) -> Vec<f64> {
+    record.repetitions.iter().map(|repetition| part(&repetition.cpu_seconds)).collect()
 }
 
 impl Group<'_, '_> {
-    /// The row by one clock; `None` where all times are too short.
-    fn timing(
-        &self,
-        &(name, clock, is_gate): &(&'static str, Clock, bool),
-        options: &DiffOptions,
-        error_rate: f64,
-    ) -> Option<Timing> {
+    /// The row; `None` where all times are too short.
+    fn timing(&self, options: &DiffOptions, error_rate: f64) -> Option<Timing> {
         // For each pair the seconds of the repetitions of both sides, where these take long enough.
         let mut pairs: Vec<[Vec<f64>; 2]> = (self.pairs.iter())
-            .map(|pair| [pair.old, pair.new].map(|record| seconds(record, clock, self.part)))
+            .map(|pair| [pair.old, pair.new].map(|record| seconds(record, self.part)))
             .collect();
         pairs.retain(|sides| {
             sides
@@ -208,7 +189,7 @@ impl Group<'_, '_> {
         let alone = if self.mesh.is_some() { 2.0 } else { 1.0 };
         let threshold = (alone * options.seconds).ln_1p();
         let evidence = [interval[0], interval[1], fastest];
-        let meaning = if !is_gate || agreement < AGREEMENT {
+        let meaning = if agreement < AGREEMENT {
             None
         } else if evidence.iter().all(|&shift| shift > threshold) {
             Some(Meaning::Regression)
@@ -220,7 +201,6 @@ impl Group<'_, '_> {
         Some(Timing {
             method: self.method.clone(),
             mesh: self.mesh.clone(),
-            clock: name,
             results: pairs.len(),
             repetitions,
             ratio: mean.exp(),

@@ -34,35 +34,17 @@ const viewOf = (() => {
     return { ...(await import(three)), ...(await import(address(controls))) };
   };
 
-  // The arrays of a view, in the order of reports/view3d.rs.
-  const read = (buffer) => {
-    const length = new DataView(buffer).getUint32(0, true);
-    const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
-    let at = 4 + length;
-    const take = (type, count) => {
-      const array = new type(buffer, at, count);
-      at += array.byteLength;
-      return array;
-    };
-    const [vertices, faces] = head.surface;
-    const indices = take(Uint32Array, 3 * faces);
+  // A view of reports/view3d.rs with typed arrays.
+  const read = (text) => {
+    const view = JSON.parse(text);
+    const indices = Uint32Array.from(view.faces);
     for (let k = 1; k < indices.length; k += 1) indices[k] += indices[k - 1];
-    const results = head.results.map(({ label, counts: [n, e, f], seams, structure }) => ({
-      label,
-      structure,
-      spheres: take(Float32Array, 4 * n),
-      edges: take(Uint32Array, 2 * e),
-      faces: take(Uint32Array, 3 * f),
-      seams: take(Uint32Array, 2 * seams),
-      junctions: take(Uint32Array, structure[2]),
-    }));
-    const steps = take(Uint16Array, 3 * vertices);
-    const positions = Float32Array.from(steps, (step, k) => head.low[k % 3] + head.step * step);
-    for (const result of results) {
-      result.errors = take(Uint8Array, vertices);
-      result.sheets = take(Uint8Array, result.faces.length / 3);
+    const positions = Float32Array.from(view.vertices, (step, k) => view.low[k % 3] + view.step * step);
+    for (const result of view.results) {
+      result.spheres = Float32Array.from(result.spheres);
+      for (const key of ["edges", "faces", "seams", "junctions"]) result[key] = Uint32Array.from(result[key]);
     }
-    return { ...head, indices, positions, results };
+    return { ...view, indices, positions };
   };
 
   // Triangles with normals and colours, one after the other.
@@ -403,7 +385,7 @@ const viewOf = (() => {
       const text = await textOf(source);
       library ??= loadLibrary();
       const T = await library;
-      const view = read(await unpacked(text).arrayBuffer());
+      const view = read(await unpacked(text).text());
       const eye = cameraOf(T, view);
       let waiting = false;
       const changed = () => {

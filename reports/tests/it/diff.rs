@@ -74,8 +74,6 @@ fn a_slow_build_is_a_regression_and_a_busy_machine_is_not() {
         let names = || ["before".to_owned(), "after".to_owned()];
         (0..200).all(|seed| {
             let diff = Diff::new(names(), &busy(seed, 5, 1.0), &busy(seed + 1000, 5, 1.0), options);
-            let wall = diff.timings.iter().filter(|timing| timing.clock == "wall");
-            assert!(wall.clone().count() >= 4 && wall.clone().all(|t| t.meaning.is_none()));
             diff.count(Meaning::Regression) + diff.count(Meaning::Improvement) == 0
         })
     };
@@ -96,9 +94,6 @@ fn only_the_slower_method_is_reported() {
         let found: Vec<_> = found.map(|t| (t.method.as_str(), t.meaning)).collect();
         assert!(found.contains(&("angle", Some(Meaning::Regression))), "seed {seed}: {found:?}");
         assert!(found.iter().all(|(method, _)| *method == "angle"), "seed {seed}: {found:?}");
-        // The clock on the wall is shown, and is no gate.
-        let wall: Vec<_> = diff.timings.iter().filter(|timing| timing.clock == "wall").collect();
-        assert!(!wall.is_empty() && wall.iter().all(|timing| timing.meaning.is_none()));
     }
     let faster = diff(&timed(1, 0.1, slower), &timed(2, 0.1, |_| 1.0));
     assert_eq!(faster.count(Meaning::Regression), 0);
