@@ -63,7 +63,7 @@ for name in $names; do
         for mode in closest inside inside-hard; do
             "$ours" run "$file" $mode "$work/answers.$mode" >/dev/null
             "$work/distance_cgal" "$file" $mode "$work/answers.cgal" >/dev/null
-            if result=$("$ours" compare "$file" $mode "$work/answers.$mode" "$work/answers.cgal"); then
+            if result=$(scripts/oracles/compare.py "$file" $mode "$work/answers.$mode" "$work/answers.cgal"); then
                 agrees=yes
             else
                 agrees=no

@@ -68,7 +68,7 @@ for name in "$@"; do
                 awk -v n="$queries" -v mesh="$label" -v mode="$cgal" '{
                     printf "%-12s %-15s %11d %11d %7.2f %8.3f %8.3f\n",
                         mesh, mode, n / $1, n / $3, $3 / $1, $2, $4 }'
-            "$ours" compare "$file" $mode "$work/answers" "$work/answers.$cgal" || status=1
+            scripts/oracles/compare.py "$file" $mode "$work/answers" "$work/answers.$cgal" || status=1
         done
     done
     rm -f "$file" "$work"/answers* "$work"/runs.*

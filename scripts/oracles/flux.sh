@@ -50,7 +50,6 @@ if [ ! "$work/distance_cgal" -nt scripts/oracles/distance_cgal.cpp ]; then
         -lgmp -lmpfr
 fi
 cargo build --quiet --release -p medial-oracles
-compare=$target/release/distance_oracle
 ours=$target/release/flux_oracle
 
 status=0
@@ -61,7 +60,7 @@ for name in "$@"; do
     "$ours" run "$file" "$work/answers"
     "$work/distance_cgal" "$file" closest "$work/answers.cgal" >/dev/null
     printf '%s, CGAL: ' "$label"
-    "$compare" compare "$file" closest "$work/answers" "$work/answers.cgal" || status=1
+    scripts/oracles/compare.py "$file" closest "$work/answers" "$work/answers.cgal" || status=1
     rm -f "$work/time.ours" "$work/time.open3d"
     i=0
     while [ $i -lt "$rounds" ]; do

@@ -1,5 +1,5 @@
-//! One side of the comparison with CGAL: makes a mesh with queries, runs them, and compares the
-//! results with those of `scripts/oracles/distance_cgal.cpp`.
+//! One side of the comparison with CGAL: makes a mesh with queries and runs them. `scripts/oracles/compare.py` compares
+//! the answers with those of `scripts/oracles/distance_cgal.cpp`.
 //!
 //! ```text
 //! distance_oracle make NAME COUNT FILE   `torus` (100,352 triangles) or a mesh file, with COUNT
@@ -8,9 +8,6 @@
 //!                                        faces, points over vertices and edges
 //! distance_oracle run FILE MODE ANSWERS  answers with doubles; prints CPU seconds for the queries
 //!                                        and for everything before them
-//! distance_oracle compare FILE MODE OURS THEIRS
-//!                                        prints the differences; fails where there are any that
-//!                                        rounding does not explain
 //! ```
 //!
 //! Modes: `closest` (points inside), `inside` (points of the box), `inside-hard` (degenerate
@@ -22,7 +19,7 @@ use std::error::Error;
 
 use medial::Vec3;
 use medial::surface::{self, InsideTest, Side, SignedDistance, TriMesh, TriangleBvh};
-use medial_oracles::{Task, bumpy_torus, bytes, cpu_seconds, numbers};
+use medial_oracles::{Task, bumpy_torus, bytes, cpu_seconds};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -31,8 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     match args.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["make", name, count, file] => make(name, count.parse()?, file),
         ["run", file, mode, answers] => run(&Task::read(file)?, mode, answers),
-        ["compare", file, mode, ours, theirs] => compare(&Task::read(file)?, mode, ours, theirs),
-        _ => Err("usage: distance_oracle make | run | compare; see the head of its source".into()),
+        _ => Err("usage: distance_oracle make | run; see the head of its source".into()),
     }
 }
 
@@ -119,38 +115,4 @@ fn run(task: &Task, mode: &str, answers: &str) -> Result<(), Box<dyn Error>> {
     };
     println!("{:.4} {:.4}", cpu_seconds() - built, built - start);
     Ok(std::fs::write(answers, bytes(found))?)
-}
-
-fn compare(task: &Task, mode: &str, ours: &str, theirs: &str) -> Result<(), Box<dyn Error>> {
-    let [ours, theirs] = [numbers(&std::fs::read(ours)?), numbers(&std::fs::read(theirs)?)];
-    if ours.len() != theirs.len() || ours.is_empty() {
-        return Err("the two sides do not have as many answers".into());
-    }
-    if mode != "closest" {
-        let differing = ours.iter().zip(&theirs).filter(|(a, b)| a != b).count();
-        let on = ours.iter().filter(|&&a| a == 0.0).count();
-        println!("{differing} differ of {} ({on} on the surface)", ours.len());
-        return if differing == 0 { Ok(()) } else { Err("inside tests differ".into()) };
-    }
-    let (lo, hi) = task.mesh.bounding_box().ok_or("the mesh has no vertices")?;
-    let diagonal = lo.distance(hi);
-    let (mut relative, mut absolute, mut apart, mut ties) = (0.0, 0.0, 0, 0);
-    for (&p, (a, b)) in task.queries[0].iter().zip(ours.chunks(4).zip(theirs.chunks(4))) {
-        let [q, r] = [a, b].map(|c| Vec3::new(c[0], c[1], c[2]));
-        // Their point, measured by us: the comparison is not about their square root.
-        let off = (a[3] - p.distance(r)).abs();
-        absolute = f64::max(absolute, off / diagonal);
-        relative = f64::max(relative, off / a[3].max(1e-3 * diagonal));
-        if q.distance(r) > 1e-9 * diagonal {
-            let tied = off <= 1e-12 * diagonal;
-            ties += usize::from(tied);
-            apart += usize::from(!tied);
-        }
-    }
-    println!(
-        "distances within {relative:.1e} relative, {absolute:.1e} of the diagonal; other points: \
-         {apart}, and {ties} ties"
-    );
-    let agree = relative <= 1e-12 && apart == 0;
-    if agree { Ok(()) } else { Err("closest points differ".into()) }
 }

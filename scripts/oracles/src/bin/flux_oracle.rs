@@ -10,8 +10,6 @@
 //!     writes closest points of the samples (x, y, z, distance) to ANSWERS, fluxes to ANSWERS.flux
 //! flux_oracle time NAME RESOLUTION
 //!     prints the seconds of all fluxes at one level, the number of voxels, the number of samples
-//! flux_oracle points NAME SIGMA X Y Z ...
-//!     prints for each point, in input units: D, closest point, flux through a sphere of radius SIGMA
 //! ```
 #![allow(clippy::print_stdout)]
 
@@ -38,13 +36,7 @@ fn main() -> Outcome {
         }
         ["run", file, answers] => run(file, answers),
         ["time", name, resolution] => time(name, resolution.parse()?),
-        ["points", name, sigma, ref rest @ ..] => {
-            let numbers: Result<Vec<f64>, _> = rest.iter().map(|word| word.parse()).collect();
-            points(name, sigma.parse()?, &numbers?)
-        }
-        _ => {
-            Err("usage: flux_oracle make | run | time | points; see the head of its source".into())
-        }
+        _ => Err("usage: flux_oracle make | run | time; see the head of its source".into()),
     }
 }
 
@@ -112,18 +104,5 @@ fn time(name: &str, resolution: u32) -> Outcome {
     let tally = solid.descend(resolution, Wanted::All)?.tally;
     let (wall, cpu) = (clock.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
     println!("{wall:.4} {cpu:.4} {} {SAMPLES}", tally.evaluated);
-    Ok(())
-}
-
-fn points(name: &str, sigma: f64, numbers: &[f64]) -> Outcome {
-    let shape = shape(&mesh(name)?)?;
-    let (surface, units) = (Surface::of(&shape)?, shape.normalisation());
-    let sphere = Sphere::new(Spiral::EqualArea, SAMPLES, sigma / units.diagonal);
-    for point in medial_oracles::points(numbers) {
-        let centre = units.forward(point);
-        let near = surface.closest(centre, None);
-        let flux = surface.flux(&sphere, centre, near.face);
-        println!("{} {} {flux}", near.distance * units.diagonal, units.backward(near.point));
-    }
     Ok(())
 }
