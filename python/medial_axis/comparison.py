@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _RESULTS = "results.csv"
 
 # A line of progress of the command: number of the item, number of items, mesh and method, and an estimate.
-_BEGUN = re.compile(r"\[(\d+)/(\d+)\] (.*?)(?:, about .* left)?$")
+_BEGUN = re.compile(r"\[(\d+)/(\d+)\] (.*)$")
 
 
 @dataclass(frozen=True)

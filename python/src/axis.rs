@@ -15,7 +15,7 @@ use medial_run::reconstruct::union_boundary;
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::calls::{Call, Failure, Kind, Once, long, of_points, of_rows, points, triangles};
+use crate::calls::{Call, Failure, Kind, Once, long, of_points, of_rows, points, triples};
 use crate::surface::{Surface, shape_options};
 
 /// A medial mesh in input units, with its shape if that is known.
@@ -76,14 +76,14 @@ impl Axis {
         edges: PyReadonlyArray2<'_, u32>,
         faces: PyReadonlyArray2<'_, u32>,
     ) -> PyResult<Self> {
-        let (centres, radii) = (points(&centres)?, crate::calls::numbers(&radii)?);
-        if centres.rows().len() != radii.rows().len() {
-            let (n, m) = (centres.rows().len(), radii.rows().len());
+        let (centres, radii) = (points(&centres)?, radii.as_array());
+        if centres.len() != radii.len() {
+            let (n, m) = (centres.len(), radii.len());
             return Err(Failure::input(format!("{n} centres, but {m} radii")).into());
         }
-        let both = centres.rows().iter().zip(radii.rows());
-        let spheres = both.map(|(&centre, &radius)| Sphere::new(centre, radius)).collect();
-        let faces = triangles(&faces)?.rows().to_vec();
+        let both = centres.into_iter().zip(radii);
+        let spheres = both.map(|(centre, &radius)| Sphere::new(centre, radius)).collect();
+        let faces = triples(&faces)?;
         let edges = edges.as_array().rows().into_iter().map(|row| [row[0], row[1]]).collect();
         let mesh = MedialMesh::from_simplices(spheres, edges, faces).map_err(Failure::from)?;
         Ok(Self::new(mesh, None))
@@ -177,7 +177,7 @@ impl Axis {
     ) -> PyResult<Self> {
         let mut mesh = MedialMesh::clone(&self.mesh);
         if let (Some(samples), Some(of_sphere)) = (samples, of_sphere) {
-            let samples: Arc<[Vec3]> = points(&samples)?.rows().into();
+            let samples: Arc<[Vec3]> = points(&samples)?.into();
             let of_sphere: Vec<[u32; 4]> =
                 of_sphere.as_array().rows().into_iter().map(|r| [r[0], r[1], r[2], r[3]]).collect();
             mesh.contacts = Some(Contacts { samples, of_sphere });
@@ -311,10 +311,7 @@ pub fn surface_from_parts(
     is_solid: bool,
     call: Call,
 ) -> PyResult<Surface> {
-    let mesh = TriMesh {
-        vertices: points(&vertices)?.rows().to_vec(),
-        faces: triangles(&faces)?.rows().to_vec(),
-    };
+    let mesh = TriMesh { vertices: points(&vertices)?, faces: triples(&faces)? };
     let report: SurfaceReport = serde_json::from_str(report)
         .map_err(|error| Failure::input(format!("report of {name}: {error}")))?;
     let truth = truth.map(|axis| MedialMesh::clone(&axis.mesh));

@@ -5,10 +5,8 @@
 //! returns at once. The work gets the cancel flag and ends at its next step; until then it continues in the background,
 //! and its result is dropped.
 //!
-//! `medial_axis/_arguments.py` has checked kind and shape of arrays and made them contiguous; here they are borrowed. An
-//! array that a thread reads stays alive as long as that thread ([`Held`]).
-
-#![allow(unsafe_code)] // Memory that numpy owns cannot be borrowed without.
+//! `medial_axis/_arguments.py` has checked kind and shape of arrays; here they are copied, since the work may outlive the
+//! call.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering;
@@ -28,7 +26,7 @@ use medial_run::error::InputError;
 use medial_run::reconstruct::ReconstructError;
 use medial_run::record::Status;
 use medial_run::timed::Fault;
-use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
@@ -292,62 +290,24 @@ about_input!(
 
 // Arrays.
 
-/// Rows of an array, which live as long as this value, on any thread.
-pub struct Held<T: 'static> {
-    rows: *const T,
-    len: usize,
-    _array: Py<PyAny>,
-}
-
-// Safety: the rows are only read, and numpy keeps them where they are while a reference exists.
-unsafe impl<T: Sync> Send for Held<T> {}
-unsafe impl<T: Sync> Sync for Held<T> {}
-
-impl<T> Held<T> {
-    /// The rows.
-    pub fn rows(&self) -> &[T] {
-        // Safety: pointer and length come from a contiguous array that `_array` keeps alive.
-        unsafe { std::slice::from_raw_parts(self.rows, self.len) }
-    }
-}
-
 /// The rows of an n x 3 array as points.
 ///
 /// # Errors
-/// When the array is not contiguous or has another shape.
-pub fn points(array: &PyReadonlyArray2<'_, f64>) -> PyResult<Held<Vec3>> {
-    triples(array)
+/// When the array has another shape.
+pub fn points(array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Vec3>> {
+    Ok(triples(array)?.into_iter().map(Vec3::from).collect())
 }
 
-/// The rows of an n x 3 array as triangles.
+/// The rows of an n x 3 array.
 ///
 /// # Errors
-/// As [`points`].
-pub fn triangles(array: &PyReadonlyArray2<'_, u32>) -> PyResult<Held<[u32; 3]>> {
-    triples(array)
-}
-
-/// An n x 3 array as `Row`, which has to be three `T` in memory.
-fn triples<T: Element, Row>(array: &PyReadonlyArray2<'_, T>) -> PyResult<Held<Row>> {
-    const { assert!(size_of::<Row>() == 3 * size_of::<T>() && align_of::<Row>() == align_of::<T>()) };
-    let slice = array.as_slice()?;
-    if array.as_array().ncols() != 3 {
+/// When the array has another shape.
+pub fn triples<T: Element + Copy>(array: &PyReadonlyArray2<'_, T>) -> PyResult<Vec<[T; 3]>> {
+    let array = array.as_array();
+    if array.ncols() != 3 {
         return Err(Failure::input("an array without three columns").into());
     }
-    Ok(Held {
-        rows: slice.as_ptr().cast(),
-        len: slice.len() / 3,
-        _array: array.as_any().clone().unbind(),
-    })
-}
-
-/// The numbers of an array.
-///
-/// # Errors
-/// When the array is not contiguous.
-pub fn numbers(array: &PyReadonlyArray1<'_, f64>) -> PyResult<Held<f64>> {
-    let slice = array.as_slice()?;
-    Ok(Held { rows: slice.as_ptr(), len: slice.len(), _array: array.as_any().clone().unbind() })
+    Ok(array.rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
 }
 
 /// A new array of points, n x 3.

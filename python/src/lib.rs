@@ -27,7 +27,7 @@ use medial_bench::main_hosted;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::calls::{Call, Failure, long, numbers, of_rows, points};
+use crate::calls::{Call, Failure, long, of_rows, points};
 use crate::method::Classes;
 
 /// In the order of `_medial.pyi`.
@@ -75,17 +75,17 @@ fn triangulate<'py>(
     call: Call,
 ) -> PyResult<Arrays<'py>> {
     let sites = points(&sites)?;
-    let weights = weights.as_ref().map(numbers).transpose()?;
+    let weights = weights.map(|weights| weights.as_array().to_vec());
     let (triangulation, hidden, repeated) = long(py, &call, move |_, monitor| {
         monitor.at("triangulating");
         let made = match &weights {
             None => {
-                let made = Delaunay::new(sites.rows())?;
+                let made = Delaunay::new(&sites)?;
                 let repeated = made.duplicates().to_vec();
                 (made.into_triangulation(), vec![], repeated)
             }
             Some(weights) => {
-                let made = Regular::new(sites.rows(), weights.rows())?;
+                let made = Regular::new(&sites, weights)?;
                 let (hidden, repeated) = (made.hidden().to_vec(), made.duplicates().to_vec());
                 (made.into_triangulation(), hidden, repeated)
             }

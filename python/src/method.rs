@@ -372,7 +372,7 @@ impl ShapeHandle {
         queries: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let queries = points(&queries)?;
-        let sides = py.detach(|| self.shape.inside_test().sides(queries.rows()));
+        let sides = py.detach(|| self.shape.inside_test().sides(&queries));
         Ok(PyArray1::from_iter(py, sides.into_iter().map(|side| side == Side::Inside)))
     }
 
@@ -384,7 +384,7 @@ impl ShapeHandle {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let queries = points(&queries)?;
         let tree = py.detach(|| self.shape.surface_tree()).map_err(Failure::from)?;
-        Ok(PyArray1::from_vec(py, py.detach(|| tree.distance_batch(queries.rows()))))
+        Ok(PyArray1::from_vec(py, py.detach(|| tree.distance_batch(&queries))))
     }
 }
 

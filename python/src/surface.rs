@@ -14,7 +14,7 @@ use medial_run::input::{Input, Source};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::calls::{Call, Failure, Kind, Once, long, of_points, of_rows, points, triangles};
+use crate::calls::{Call, Failure, Kind, Once, long, of_points, of_rows, points, triples};
 
 /// A surface that bounds a solid, in its own units.
 #[pyclass(frozen, module = "medial_axis._medial")]
@@ -128,10 +128,10 @@ impl Surface {
         name: String,
         call: Call,
     ) -> PyResult<Self> {
-        let (vertices, faces) = (points(&vertices)?, triangles(&faces)?);
+        let (vertices, faces) = (points(&vertices)?, triples(&faces)?);
         long(py, &call, move |_, monitor| {
             monitor.at("reading");
-            let loaded = surface::read_triangles(vertices.rows(), faces.rows())?;
+            let loaded = surface::read_triangles(&vertices, &faces)?;
             Ok(Self::new(name, loaded, None))
         })
     }
@@ -208,7 +208,7 @@ impl Surface {
         let model = Arc::clone(&self.model);
         let found = long(py, &call, move |_, monitor| {
             monitor.at("searching the closest points");
-            Ok(model.tree()?.closest_batch(queries.rows()))
+            Ok(model.tree()?.closest_batch(&queries))
         })?;
         let distances = PyArray1::from_iter(py, found.iter().map(|closest| closest.distance));
         let faces = PyArray1::from_iter(py, found.iter().map(|closest| closest.face));
@@ -228,7 +228,7 @@ impl Surface {
         let found = long(py, &call, move |_, monitor| {
             monitor.at("measuring signed distances");
             let distance = SignedDistance::closed(model.tree()?, model.inside());
-            Ok(distance.batch(queries.rows()))
+            Ok(distance.batch(&queries))
         })?;
         Ok(PyArray1::from_vec(py, found))
     }
