@@ -81,38 +81,27 @@ fn sources(dir: &Path) -> Vec<Source> {
     study.and_then(|study| study.sources().ok()).unwrap_or_default()
 }
 
-/// The report of a run of `compare`.
-pub struct RunReport<'a> {
-    pub dir: &'a Path,
-    pub registry: &'a Registry,
-    /// The origin of the new records.
-    pub provenance: &'a Provenance,
-    /// The items of the run, in the order of the tables.
-    pub items: &'a [Item],
-    pub adds: bool,
-}
-
-impl RunReport<'_> {
-    /// Writes the report. Without new records the page stays unchanged. Fails when the records cannot be read, or the
-    /// report cannot be written.
-    pub fn write(&self) -> Result<Rebuilt, Failure> {
-        let (records, warnings) = records(self.dir)?;
-        // Byte for byte the same page: a repeated command changes no file.
-        if !self.adds && self.dir.join(PAGE).exists() {
-            let (files, undrawn) = (vec![], vec![]);
-            return Ok(Rebuilt { records, files, warnings, undrawn });
-        }
-        let mut header = header(self.dir, &records, self.registry, &warnings);
-        let Provenance { command, binary_hash, .. } = self.provenance;
-        let mut runs = header.runs.iter_mut();
-        if let Some(run) = runs.find(|r| (&r.command, &r.binary_hash) == (command, binary_hash)) {
-            // The store keeps the date of the first run of a command.
-            let now = jiff::Timestamp::now().to_zoned(TimeZone::UTC);
-            run.date.get_or_insert_with(|| now.date().to_string());
-        }
-        let dirs = [self.dir; 2];
-        write(dirs, (records, warnings), (self.items, self.registry), header)
+/// Writes the report of a run of `compare`, whose items give the order of the tables. A page that is there is that of all
+/// records, and stays byte for byte. Fails when the records cannot be read, or the report cannot be written.
+pub fn report_of_run(
+    dir: &Path,
+    items: &[Item],
+    registry: &Registry,
+    provenance: &Provenance,
+) -> Result<Rebuilt, Failure> {
+    let (records, warnings) = records(dir)?;
+    if dir.join(PAGE).exists() {
+        return Ok(Rebuilt { records, files: vec![], warnings, undrawn: vec![] });
     }
+    let mut header = header(dir, &records, registry, &warnings);
+    let Provenance { command, binary_hash, .. } = provenance;
+    let mut runs = header.runs.iter_mut();
+    if let Some(run) = runs.find(|r| (&r.command, &r.binary_hash) == (command, binary_hash)) {
+        // The store keeps the date of the first run of a command.
+        let now = jiff::Timestamp::now().to_zoned(TimeZone::UTC);
+        run.date.get_or_insert_with(|| now.date().to_string());
+    }
+    write([dir; 2], (records, warnings), (items, registry), header)
 }
 
 /// Writes the report of a store into a folder: that of the store, or another one for a site.

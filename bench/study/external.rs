@@ -267,9 +267,6 @@ medial::parameters! {
         /// Seconds as claimed.
         #[serde(skip_serializing_if = "Option::is_none")]
         claimed_seconds: Option<f64> = None, "seconds";
-        /// Further names of external results with the same bytes.
-        #[serde(skip_serializing_if = "String::is_empty")]
-        same_as: String = String::new(), "names";
     }
 }
 
@@ -295,15 +292,12 @@ fn prepare<'s>(
     params: ExternalParams,
     _run: &RunContext,
 ) -> Result<Box<dyn Simplification + 's>, SimplifyError> {
-    let ExternalParams { file, same_as, fit, radii, lenient, block, claimed_seconds, .. } = params;
+    let ExternalParams { file, fit, radii, lenient, block, claimed_seconds, .. } = params;
     let options = AxisOptions { lenient, block, radii, fit };
     let read = read_axis(&file, shape, options);
     let (loaded, _) = read.map_err(|error| SimplifyError::Parameter(error.to_string()))?;
     // Notes of the reader belong to the result, since they affect its numbers.
-    let (mesh, mut remarks) = loaded.with_remarks();
-    if !same_as.is_empty() {
-        remarks.push(format!("has the same bytes as {same_as}"));
-    }
+    let (mesh, remarks) = loaded.with_remarks();
     let units = *shape.normalisation();
     let mesh = mesh.to_normal(&units);
     Ok(Box::new(move |level: Level| {
@@ -374,13 +368,6 @@ impl Study {
             }
             files.push(file);
         }
-        for file in 0..files.len() {
-            let (mesh, hash) = (&files[file].mesh, &files[file].hash);
-            let others = files.iter().enumerate().filter(|&(other, _)| other != file);
-            let same = others.filter(|(_, f)| f.mesh == *mesh && f.hash == *hash);
-            let names: Vec<&str> = same.map(|(_, f)| f.name.as_str()).collect();
-            files[file].params.same_as = names.join(", ");
-        }
         Ok(files)
     }
 
@@ -437,7 +424,7 @@ impl Study {
         let named = stem.rsplit_once('-').and_then(|(_, count)| count.parse().ok());
         let spheres = named.filter(|&count| is_near(spheres, count)).unwrap_or(spheres);
         let claimed_seconds = seconds.get(&*stem).copied();
-        let (file, same_as) = (path.to_string_lossy().into_owned().into(), String::new());
+        let file = path.to_string_lossy().into_owned().into();
         let params = ExternalParams {
             file,
             fit,
@@ -451,7 +438,6 @@ impl Study {
             run,
             machine,
             claimed_seconds,
-            same_as,
         };
         Ok(ExternalFile { mesh, name: given.name, params, hash: hex_digest(&bytes), spheres })
     }
