@@ -220,7 +220,7 @@ fn default_meshes_have_a_few_thousand_vertices_with_edges_as_announced() {
 fn the_catalogue_is_consistent() {
     let shapes = catalogue();
     let mut ids: Vec<_> = shapes.iter().map(|shape| shape.id).collect();
-    assert_eq!(shapes.iter().filter(|shape| shape.axis().is_some()).count(), 20);
+    assert_eq!(shapes.iter().filter(|shape| shape.axis().is_some()).count(), 18);
     ids.sort_unstable();
     ids.dedup();
     assert_eq!(ids.len(), shapes.len());
