@@ -11,9 +11,15 @@ use std::time::{Duration, Instant};
 use medial::complex;
 use medial_test_support::skip;
 
-use crate::command::{MEDIAL, done, records, text_path};
+use crate::command::{Folder, number};
 
 const ADAPTERS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/adapters/adapters.toml");
+
+/// A comparison of adapters, into `report`.
+fn compare(at: &Folder, line: &str) -> Command {
+    let options = "--counts-only --samples 500 --quiet --out report";
+    at.command(&format!("compare builtin:capsule --plugins {ADAPTERS} {options} {line}"))
+}
 
 fn program(path: &Path, text: &str) {
     fs::write(path, format!("#!/bin/sh\n{text}\n")).expect("written");
@@ -21,10 +27,9 @@ fn program(path: &Path, text: &str) {
 }
 
 /// A medial mesh of the built-in capsule with 20 spheres, ten times as large and elsewhere.
-fn normalised(folder: &Path) -> std::path::PathBuf {
-    let file = folder.join("axis.ma");
-    let words = ["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "-o"];
-    done(&[&words[..], &[text_path(&file)]].concat());
+fn normalised(at: &Folder) -> std::path::PathBuf {
+    at.done("simplify builtin:capsule -m qmat --spheres 20 -o axis.ma");
+    let file = at.at("axis.ma");
     let axis = complex::read(&file).expect("a medial mesh").mesh;
     let moved = axis.transformed(10.0, |p| 10.0 * p + medial::Vec3::new(5.0, -3.0, 70.0));
     complex::write(&file, &moved).expect("written");
@@ -37,12 +42,11 @@ fn results_of_programs_that_do_not_end_are_read_and_fitted() {
         skip("no python3");
         return;
     }
-    let dir = tempfile::tempdir().expect("a folder");
-    let axis = normalised(dir.path());
+    let at = Folder::new();
+    let axis = normalised(&at);
     let axis = axis.display();
     let [tetrahedra, mattopo, matstruct, prepare, matfp] =
-        ["ftetwild", "mattopo", "matstruct", "matfp_pre", "matfp"]
-            .map(|name| dir.path().join(name));
+        ["ftetwild", "mattopo", "matstruct", "matfp_pre", "matfp"].map(|name| at.at(name));
     program(&tetrahedra, "cp \"$2\" \"$4\"");
     let then_waits = "sleep 600";
     program(
@@ -58,20 +62,15 @@ fn results_of_programs_that_do_not_end_are_read_and_fitted() {
     );
     program(&prepare, "cp \"$1\" ../input/mesh/mesh_surface.geogram");
     program(&matfp, &format!("test \"$2\" = --ds=0.1 || exit 3\ncp {axis} mat.ma\n{then_waits}"));
-    let out = dir.path().join("report");
     let begun = Instant::now();
-    let done = Command::new(MEDIAL)
-        .args(["compare", "builtin:capsule", "--plugins", ADAPTERS, "--counts-only", "--published"])
-        .args(["--methods", "mattopo,matstruct,matfp", "--levels", "matstruct=30"])
-        .args(["--spheres", "20"])
-        .args(["--samples", "500", "--quiet", "--out"])
-        .arg(&out)
+    let line = "--methods mattopo,matstruct,matfp --levels matstruct=30 --published --spheres 20";
+    let done = compare(&at, line)
         .envs([("FTETWILD", &tetrahedra), ("MATTOPO", &mattopo), ("MATSTRUCT", &matstruct)])
         .envs([("MATFP_PRE", &prepare), ("MATFP", &matfp)])
         .output()
         .expect("it runs");
     assert!(begun.elapsed() < Duration::from_secs(300), "the programs are ended");
-    let records = records(&out);
+    let records = at.records("report");
     let expected = [("mattopo", "spheres"), ("matstruct", "native"), ("matfp", "published")];
     for (method, level) in expected {
         let of_level = |record: &&serde_json::Value| {
@@ -90,23 +89,17 @@ fn results_of_programs_that_do_not_end_are_read_and_fitted() {
         let scale = warnings.split("fitted: lengths times ").nth(1);
         let scale = scale.and_then(|text| text.split(',').next()?.parse::<f64>().ok());
         assert!(scale.is_some_and(|scale| (10.0 * scale - 1.0).abs() < 0.01), "{warnings}");
-        assert!(record["evaluate"]["hausdorff"].as_f64().expect("measured") < 0.05, "{record}");
+        assert!(number(&record["evaluate"]["hausdorff"]) < 0.05, "{record}");
     }
 }
 
 #[test]
 fn a_missing_program_is_named() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let out = dir.path().join("report");
-    let done = Command::new(MEDIAL)
-        .args(["compare", "builtin:capsule", "--plugins", ADAPTERS, "--counts-only", "--quiet"])
-        .args(["--methods", "mattopo", "--spheres", "20", "--samples", "500", "--out"])
-        .arg(&out)
-        .env_remove("MATTOPO")
-        .output();
+    let at = Folder::new();
+    let done = compare(&at, "--methods mattopo --spheres 20").env_remove("MATTOPO").output();
     assert_eq!(done.expect("it runs").status.code(), Some(5), "nothing measured");
     if Command::new("python3").arg("--version").output().is_ok() {
-        let record = &records(&out)[0];
+        let record = &at.records("report")[0];
         assert_eq!(record["status"], "unsupported", "{record}");
         assert!(record["reason"].as_str().expect("a reason").contains("MATTOPO"), "{record}");
     }

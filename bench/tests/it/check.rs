@@ -1,18 +1,14 @@
 //! The conformance corpus: all methods of the project pass it, and broken methods fail.
 
-use std::path::Path;
-
 use serde_json::Value;
 
-use crate::command::{MEDIAL, done, faulty, json_of, refused};
+use crate::command::{Folder, faulty};
 
 const PLUGINS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/plugins/largest.toml");
 
-/// The exit code and the object of `check`.
-fn check(program: impl AsRef<Path>, arguments: &[&str]) -> (i32, Value) {
-    // A busy machine must not fail the test.
-    let patient = if arguments.contains(&"--timeout") { &[][..] } else { &["--timeout", "1800"] };
-    json_of(program, &[&["check"], patient, arguments].concat())
+/// The exit code and the object of `check`, which a busy machine must not fail.
+fn check(line: &str) -> (i32, Value) {
+    Folder::new().json(&format!("check --timeout 1800 {line}"))
 }
 
 /// Cases with this outcome, as `method case: reason`.
@@ -39,12 +35,12 @@ fn assert_passes((code, object): (i32, Value), methods: usize) {
 fn all_built_in_methods_pass() {
     let on_request = medial_methods::registry().into_iter().filter(|m| m.presentation.on_request);
     let all = medial_methods::registry().len();
-    assert_passes(check(MEDIAL, &[]), all - on_request.count());
+    assert_passes(check(""), all - on_request.count());
 }
 
 #[test]
 fn fast_methods_pass() {
-    assert_passes(check(MEDIAL, &["angle", "lambda", "qmat", "pmat"]), 4);
+    assert_passes(check("angle lambda qmat pmat"), 4);
 }
 
 /// On each push every method passes the fast cases, and nightly all of them.
@@ -52,9 +48,8 @@ fn fast_methods_pass() {
 fn every_method_passes_the_core_cases() {
     let ids: Vec<String> =
         medial_methods::registry().iter().map(|m| m.method.info().id.to_string()).collect();
-    let mut arguments: Vec<&str> = ids.iter().map(String::as_str).collect();
-    arguments.extend(["--case", "report", "--case", "no-spheres", "--case", "valid-box"]);
-    let (code, object) = check(MEDIAL, &arguments);
+    let cases = "--case report --case no-spheres --case valid-box";
+    let (code, object) = check(&format!("{} {cases}", ids.join(" ")));
     assert_eq!(ended(&object, "failed"), Vec::<String>::new());
     assert_eq!((code, object["passed"].as_u64()), (0, Some(3 * ids.len() as u64)), "{object}");
 }
@@ -62,23 +57,23 @@ fn every_method_passes_the_core_cases() {
 /// `compare --seeds` runs only such methods with each seed.
 #[test]
 fn a_method_whose_result_depends_on_the_seed_is_declared_seeded() {
-    let (code, object) = check(MEDIAL, &["vmas", "--set", "iterations=20", "--case", "repeated"]);
+    let (code, object) = check("vmas --set iterations=20 --case repeated");
     assert_eq!((code, ended(&object, "failed")), (0, vec![]));
 }
 
 #[test]
 #[ignore = "minutes; run nightly"]
 fn variants_pass() {
-    assert_passes(check(MEDIAL, &["angle", "--set", "variant=facet"]), 1);
-    assert_passes(check(MEDIAL, &["lambda", "--set", "variant=cell"]), 1);
+    assert_passes(check("angle --set variant=facet"), 1);
+    assert_passes(check("lambda --set variant=cell"), 1);
     // Without a limit of rounds it takes minutes for a sphere count that it cannot reach.
-    assert_passes(check(MEDIAL, &["vmas", "--set", "iterations=20"]), 1);
+    assert_passes(check("vmas --set iterations=20"), 1);
 }
 
 #[test]
 #[cfg(unix)]
 fn a_program_in_shell_passes() {
-    assert_passes(check(MEDIAL, &["largest-awk", "--plugins", PLUGINS]), 1);
+    assert_passes(check(&format!("largest-awk --plugins {PLUGINS}")), 1);
 }
 
 #[test]
@@ -86,7 +81,7 @@ fn a_program_in_python_passes() {
     if !medial_test_support::has_numpy() {
         return;
     }
-    assert_passes(check(MEDIAL, &["largest", "--plugins", PLUGINS]), 1);
+    assert_passes(check(&format!("largest --plugins {PLUGINS}")), 1);
 }
 
 /// Method, case that finds its fault, part of the reason, case that it passes.
@@ -114,9 +109,9 @@ fn faulty_methods_are_found_and_the_rest_continues() {
     for (method, finds, words, passes) in FAULTY {
         // Methods that end by themselves, or by their memory, may take longer on a busy machine.
         let timeout = if method == "loops" { "3" } else { "60" };
-        let limits = ["--timeout", timeout, "--memory", "1500"];
-        let cases = [method, "--case", finds, "--case", passes];
-        let (code, object) = check(faulty(), &[&cases[..], &limits].concat());
+        let (code, object) = Folder::of(faulty()).json(&format!(
+            "check {method} --case {finds} --case {passes} --timeout {timeout} --memory 1500"
+        ));
         assert_eq!(code, 3, "{object}");
         let [found] = &ended(&object, "failed")[..] else { panic!("{object}") };
         assert!(found.starts_with(&format!("{method} {finds}: ")), "{found}");
@@ -126,20 +121,21 @@ fn faulty_methods_are_found_and_the_rest_continues() {
 
 #[test]
 fn methods_that_print_unusual_output_pass() {
-    assert_passes(check(faulty(), &["talks"]), 1);
+    assert_passes(Folder::of(faulty()).json("check talks --timeout 1800"), 1);
 }
 
 #[test]
 fn unknown_names_exit_with_a_usage_error() {
-    refused(&["check", "nothing"], 2, "unknown method `nothing` (expected one of: angle");
-    refused(&["check", "qmat", "--case", "nothing"], 2, "(expected one of: report");
-    refused(&["check", "qmat", "--set", "nothing=1"], 2, "list them by `medial methods qmat`");
-    refused(&["check", "qmat", "--timeout", "0"], 2, "positive");
+    let at = Folder::new();
+    at.refused("check nothing", 2, "unknown method `nothing` (expected one of: angle");
+    at.refused("check qmat --case nothing", 2, "(expected one of: report");
+    at.refused("check qmat --set nothing=1", 2, "list them by `medial methods qmat`");
+    at.refused("check qmat --timeout 0", 2, "positive");
 }
 
 #[test]
 fn each_case_prints_a_line() {
-    let text = done(&["check", "qmat", "--case", "report", "--case", "no-spheres"]);
+    let text = Folder::new().done("check qmat --case report --case no-spheres");
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines.len(), 3, "{text}");
     assert!(lines[0].starts_with("qmat           report") && lines[0].ends_with("s  ok"), "{text}");

@@ -1,9 +1,8 @@
 //! The command: printed text, written files, exit codes.
 
 use std::fs;
-use std::process::Command;
 
-use crate::command::{MEDIAL, done, ended, folder, json, refused, words};
+use crate::command::{Folder, ended};
 
 /// Seconds and sizes that differ from run to run become `#`.
 fn without_timings(text: &str) -> String {
@@ -16,7 +15,7 @@ fn without_timings(text: &str) -> String {
 
 #[test]
 fn help_names_every_verb() {
-    insta::assert_snapshot!(done(&["--help"]));
+    insta::assert_snapshot!(Folder::new().done("--help"));
 }
 
 #[test]
@@ -26,8 +25,7 @@ fn every_help_ends_with_examples_that_parse() {
     let verbs: Vec<&str> = verbs.map(clap::Command::get_name).collect();
     assert!(verbs.len() > 15, "{verbs:?}");
     for verb in verbs.into_iter().map(Some).chain([None]) {
-        let words: Vec<&str> = verb.into_iter().chain(["--help"]).collect();
-        let help = done(&words);
+        let help = Folder::new().done(&format!("{} --help", verb.unwrap_or_default()));
         let (_, examples) = help.split_once("\nExamples:\n").expect("a heading of examples");
         let examples: Vec<&str> = examples.lines().map_while(|l| l.strip_prefix("  ")).collect();
         assert!((2..=3).contains(&examples.len()), "{verb:?}: {examples:?}");
@@ -43,11 +41,12 @@ fn every_help_ends_with_examples_that_parse() {
 
 #[test]
 fn methods_and_their_parameters() {
-    insta::assert_snapshot!("methods", done(&["methods"]));
+    let at = Folder::new();
+    insta::assert_snapshot!("methods", at.done("methods"));
     for id in ["qmat", "pmat", "hem", "angle"] {
-        insta::assert_snapshot!(format!("methods_{id}"), done(&["methods", id]));
+        insta::assert_snapshot!(format!("methods_{id}"), at.done(&format!("methods {id}")));
     }
-    let (code, _, stderr) = crate::command::run(&["methods", "nothing"]);
+    let (code, _, stderr) = at.run("methods nothing");
     assert_eq!(code, 2);
     insta::assert_snapshot!("methods_unknown", stderr);
 }
@@ -55,10 +54,9 @@ fn methods_and_their_parameters() {
 #[test]
 fn datasets_are_listed() {
     // An empty cache, independent of the meshes that this machine has.
-    let cache = tempfile::tempdir().expect("a folder");
-    let mut command = Command::new(MEDIAL);
-    let command = command.args(["datasets", "list"]).env("MEDIAL_CACHE", cache.path());
-    let (_, text, _) = ended(command.output().expect("the command starts"));
+    let at = Folder::new();
+    let output = at.command("datasets list").env("MEDIAL_CACHE", at.at("")).output();
+    let (_, text, _) = ended(output.expect("the command starts"));
     let (shapes, published) = text.split_once("\n\n").expect("two lists");
     insta::assert_snapshot!(shapes);
     let public = published.lines().next().expect("a line");
@@ -67,8 +65,9 @@ fn datasets_are_listed() {
 
 #[test]
 fn info_on_a_built_in_shape() {
-    insta::assert_snapshot!(done(&["info", "builtin:torus"]));
-    let (_, object) = json(&["info", "builtin:torus"]);
+    let at = Folder::new();
+    insta::assert_snapshot!(at.done("info builtin:torus"));
+    let (_, object) = at.json("info builtin:torus");
     for key in "vertices faces components genus closed manifold oriented self_intersecting degenerate_faces diagonal repairs"
         .split(' ') {
         assert!(!object[key].is_null(), "{key} is missing in {object}");
@@ -77,11 +76,10 @@ fn info_on_a_built_in_shape() {
 
 #[test]
 fn info_describes_a_mesh_that_it_refuses() {
-    let at = folder();
-    let path = at("open.off");
+    let at = Folder::new();
     let text = "OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n";
-    fs::write(&path, text).expect("written");
-    let (code, object) = json(&["info", &path]);
+    at.write("open.off", text);
+    let (code, object) = at.json("info open.off");
     assert_eq!(code, 1);
     assert_eq!(object["closed"], false);
     assert_eq!(object["boundary_edges"], 3);
@@ -90,16 +88,14 @@ fn info_describes_a_mesh_that_it_refuses() {
 
 #[test]
 fn threads_change_no_byte() {
-    let at = folder();
+    let at = Folder::new();
+    let simplify = |method| format!("simplify builtin:blob --spheres 100 -m {method}");
     // Later commands read the file of the first one.
-    let mesh = "builtin:blob";
-    let axis = at("qmat-1.ma");
-    let simplify = |method| ["simplify", mesh, "--spheres", "100", "-m", method].to_vec();
     let reconstruct = |method| {
-        ["reconstruct", &axis, "--mesh", mesh, "--tolerance", "0.05", "--method", method].to_vec()
+        format!("reconstruct qmat-1.ma --mesh builtin:blob --tolerance 0.05 --method {method}")
     };
-    let render = [&["render", mesh, &axis, "--show", "error"][..], &["--size", "200x150"]].concat();
-    for (name, words) in [
+    let render = "render builtin:blob qmat-1.ma --show error --size 200x150 --tolerance 0.03";
+    for (name, line) in [
         ("qmat-%.ma", simplify("qmat")),
         ("pmat-%.ma", simplify("pmat")),
         ("hem-%.ma", simplify("hem")),
@@ -108,19 +104,20 @@ fn threads_change_no_byte() {
         ("lambda-%.ma", simplify("lambda")),
         ("union-%.obj", reconstruct("union")),
         ("crust-%.obj", reconstruct("power-crust")),
-        ("%.png", [&render[..], &["--tolerance", "0.03"]].concat()),
+        ("%.png", render.to_owned()),
     ] {
         let written = ["1", "2"].map(|threads| {
-            let path = at(&name.replace('%', threads));
-            done(&[&words[..], &["--threads", threads, "-o", &path]].concat());
-            fs::read(path).expect("written")
+            let file = name.replace('%', threads);
+            at.done(&format!("{line} --threads {threads} -o {file}"));
+            fs::read(at.at(file)).expect("written")
         });
-        assert!(written[0] == written[1], "{words:?}");
+        assert!(written[0] == written[1], "{line}");
     }
 }
 
 #[test]
 fn wrong_arguments_exit_with_a_usage_error() {
+    let at = Folder::new();
     for line in [
         "compare builtin:nothing --methods nothing",
         "compare --spheres 0",
@@ -131,42 +128,38 @@ fn wrong_arguments_exit_with_a_usage_error() {
         "axis builtin:box:x",
         "info builtin:box --threads 0",
     ] {
-        refused(&words(line), 2, "");
+        at.refused(line, 2, "");
     }
-    refused(&["simplify", "no-such-file.off", "--method", "qmat"], 1, "no-such-file.off");
+    at.refused("simplify no-such-file.off --method qmat", 1, "no-such-file.off");
 }
 
 #[test]
 fn printed_results() {
-    let at = folder();
-    let axis = at("qmat.ma");
-    let simplify = ["simplify", "builtin:capsule", "--method", "qmat", "--spheres", "20"];
-    let simplified = done(&[&simplify[..], &["-o", &axis]].concat()).replace(&axis, "qmat.ma");
-    let default =
-        "simplify builtin:box:8 --spheres 20 --set rounds=1 --set start=100 --set samples=500 -o";
-    let default = done(&[&words(default)[..], &[&axis]].concat());
+    let at = Folder::new();
+    let simplified = at.done("simplify builtin:capsule --method qmat --spheres 20 -o qmat.ma");
+    let default = "simplify builtin:box:8 --spheres 20 --set rounds=1 --set start=100 --set samples=500 -o x.ma";
+    let default = at.done(default);
     assert!(default.starts_with("tight (default): 20 spheres"), "{default}");
     insta::assert_snapshot!("simplify", without_timings(&simplified));
-    insta::assert_snapshot!("axis", without_timings(&done(&["axis", "builtin:capsule"])));
+    insta::assert_snapshot!("axis", without_timings(&at.done("axis builtin:capsule")));
 }
 
 #[test]
 fn absurd_requests_are_refused_at_once() {
-    let at = folder();
-    let (ball, huge, nowhere) = (at("ball.ma"), at("huge.ma"), at("no/such/folder/x.ma"));
-    fs::write(&ball, "1 0 0\nv 0 0 0 1\n").expect("written");
-    fs::write(&huge, "1 0 0\nv 0 0 0 1e200\n").expect("written");
-    let mesh = "builtin:sphere:8";
-    let cases: [(&[&str], i32, &str); 9] = [
-        (&["info", mesh, "--threads", "100000"], 2, "1024"),
-        (&["evaluate", mesh, &ball, "--samples", "99999999999"], 2, "10000000"),
-        (&["evaluate", mesh, &ball, "--certify", "1e-9"], 2, "1e-6"),
-        (&["evaluate", mesh, &huge], 1, "huge.ma: sphere 0"),
-        (&["simplify", mesh, "-m", "qmat", "-o", &nowhere], 1, "the folder does not exist"),
-        (&["simplify", mesh, "-m", "qmat", "-o", "x.xyz"], 1, "(found \"xyz\", expected one of"),
-        (&["simplify", mesh, "-m", "qmat", "--max-error", "inf"], 2, "inf"),
-        (&["simplify", mesh, "-m", "qmat", "--set", "k=x", "-o", "x.ma"], 2, "k = \"x\""),
-        (&["simplify", "builtin:nothing", "-m", "qmat"], 2, "`nothing`"),
-    ];
-    cases.into_iter().for_each(|(arguments, code, part)| refused(arguments, code, part));
+    let at = Folder::new();
+    at.write("ball.ma", "1 0 0\nv 0 0 0 1\n");
+    at.write("huge.ma", "1 0 0\nv 0 0 0 1e200\n");
+    for (line, code, part) in [
+        ("info builtin:sphere:8 --threads 100000", 2, "1024"),
+        ("evaluate builtin:sphere:8 ball.ma --samples 99999999999", 2, "10000000"),
+        ("evaluate builtin:sphere:8 ball.ma --certify 1e-9", 2, "1e-6"),
+        ("evaluate builtin:sphere:8 huge.ma", 1, "huge.ma: sphere 0"),
+        ("simplify builtin:sphere:8 -m qmat -o no/such/x.ma", 1, "the folder does not exist"),
+        ("simplify builtin:sphere:8 -m qmat -o x.xyz", 1, "(found \"xyz\", expected one of"),
+        ("simplify builtin:sphere:8 -m qmat --max-error inf", 2, "inf"),
+        ("simplify builtin:sphere:8 -m qmat --set k=x -o x.ma", 2, "k = \"x\""),
+        ("simplify builtin:nothing -m qmat", 2, "`nothing`"),
+    ] {
+        at.refused(line, code, part);
+    }
 }

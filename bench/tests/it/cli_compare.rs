@@ -1,71 +1,68 @@
 //! `medial compare`: records, files and exit codes.
 
 use std::fs;
-use std::path::Path;
 
 use serde_json::Value;
 
-use crate::command::{done, folder, json, records, refused, words};
+use crate::command::{Folder, cubes_off, ended, json_of, number};
 
 #[test]
 fn compare_records_every_run() {
-    let at = folder();
-    let out = at("report");
-    let line = "compare builtin:box builtin:torus --spheres 100,50 --counts-only --samples 1000 --budget 300";
+    let at = Folder::new();
+    let line = "compare builtin:box builtin:torus --spheres 100,50 --counts-only --samples 1000 --budget 300 \
+                --out report";
     // Counts that are missed are results.
-    let stdout = done(&[&words(line)[..], &["--out", &out]].concat());
+    let stdout = at.done(line);
     insta::assert_snapshot!("compare_summary_heads", heads(&stdout));
     let methods = medial_methods::registry();
     let usual = methods.iter().filter(|entry| !entry.presentation.on_request).count();
-    let records = records(&out);
+    let records = at.records("report");
     assert_eq!(records.len(), 2 * usual * 2);
     for record in records {
-        let requested = record["simplify"]["level"]["spheres"].as_f64().expect("a count");
-        let reached = record["simplify"]["reached"].as_f64().expect("a count");
+        let simplify = &record["simplify"];
+        let [requested, reached] =
+            [&simplify["level"]["spheres"], &simplify["reached"]].map(number);
         let near = (reached - requested).abs() <= 0.02 * requested;
         assert_eq!(record["status"], if near { "ok" } else { "other_count" }, "{record}");
         assert_eq!(record["reason"].is_null(), near, "{record}");
         assert!(record["evaluate"]["hausdorff"].is_f64(), "{record}");
-        let artifact = Path::new(&out).join(record["artifact"].as_str().expect("an artifact"));
-        assert!(artifact.exists(), "{}", artifact.display());
+        let artifact = record["artifact"].as_str().expect("an artifact");
+        assert!(at.has(format!("report/{artifact}")), "{artifact}");
     }
     for file in ["index.html", "results.csv", "tables/summary.md", "tables/summary.tex"] {
-        assert!(Path::new(&out).join(file).exists(), "{file}");
+        assert!(at.has(format!("report/{file}")), "{file}");
     }
-    done(&["report", &out]);
-    let words = [&words(line)[..], &["--out", &out, "-q", "--strict"]].concat();
-    refused(&words, 3, "");
+    at.done("report report");
+    at.refused(&format!("{line} -q --strict"), 3, "");
 }
 
 #[test]
 fn without_a_mesh_few_shapes_run() {
-    let at = folder();
-    let out = at("report");
-    let words = words("compare --methods pmat --spheres 50 --counts-only --samples 200 -q --out");
-    assert_eq!(json(&[&words[..], &[&out]].concat()).1["run"], 3);
+    let at = Folder::new();
+    let line = "compare --methods pmat --spheres 50 --counts-only --samples 200 -q --out report";
+    assert_eq!(at.json(line).1["run"], 3);
     let meshes = ["bracket", "torus", "blob"];
-    assert!(records(&out).iter().zip(meshes).all(|(record, mesh)| record["mesh"] == mesh));
-    let all = [&words[..], &[&out, "--dataset", "builtin"]].concat();
-    let (_, object) = json(&all);
+    assert!(at.records("report").iter().zip(meshes).all(|(record, mesh)| record["mesh"] == mesh));
+    let (_, object) = at.json(&format!("{line} --dataset builtin"));
     assert!(object["found"] == 3 && object["records"].as_u64() > Some(10), "{object}");
 }
 
 #[test]
 fn native_levels_bounds_chains_and_the_start_are_rows() {
-    let at = folder();
-    let out = at("report");
-    let line = "compare builtin:capsule --methods qmat,angle --spheres 40 --max-error 0.05,0.0001 \
-                --after-filters qmat --levels angle=30,60,90 --certify 0.01 --samples 500 --out";
+    let at = Folder::new();
     // A bound below the error of the samples is missed, which is a result.
-    done(&[&words(line)[..], &[&out]].concat());
-    let records = records(&out);
+    at.done(
+        "compare builtin:capsule --methods qmat,angle --spheres 40 --max-error 0.05,0.0001 --after-filters qmat \
+         --levels angle=30,60,90 --certify 0.01 --samples 500 --out report",
+    );
+    let records = at.records("report");
     let of = |method: &str, level: Value| {
         let found = records.iter().find(|record| {
             record["simplify"]["method"] == method && record["simplify"]["level"] == level
         });
         found.unwrap_or_else(|| panic!("{method} {level}")).clone()
     };
-    let hausdorff = |record: &Value| record["evaluate"]["hausdorff"].as_f64().expect("a number");
+    let hausdorff = |record: &Value| number(&record["evaluate"]["hausdorff"]);
     let start = of("initial", "published".into());
     assert_eq!(start["simplify"]["spheres"], start["initial"]["spheres"]);
     for method in ["qmat", "angle", "angle+qmat", "lambda+qmat", "aof+qmat"] {
@@ -75,7 +72,7 @@ fn native_levels_bounds_chains_and_the_start_are_rows() {
         let why = beyond["reason"].as_str().expect("a reason");
         assert!(beyond["status"] == "bound_missed" && why.contains("lowest error"), "{beyond}");
         let certified = &within["evaluate"]["certified"];
-        assert!(certified["upper"].as_f64().expect("certified") >= 0.99 * hausdorff(&within));
+        assert!(number(&certified["upper"]) >= 0.99 * hausdorff(&within));
     }
     for level in [30.0, 60.0, 90.0] {
         assert_eq!(of("angle", serde_json::json!({ "native": level }))["status"], "ok");
@@ -84,7 +81,7 @@ fn native_levels_bounds_chains_and_the_start_are_rows() {
     let chain = of("angle+qmat", serde_json::json!({ "spheres": 40 }));
     assert_eq!(chain["simplify"]["spheres"], 40);
     assert!(chain["simplify"]["warnings"].to_string().contains("to start from"), "{chain}");
-    let page = fs::read_to_string(at("report/index.html")).expect("a page");
+    let page = at.text("report/index.html");
     for text in ["Equal error", "native levels", "angle+qmat", "theta"] {
         assert!(page.contains(text), "{text}");
     }
@@ -92,20 +89,20 @@ fn native_levels_bounds_chains_and_the_start_are_rows() {
 
 #[test]
 fn spheres_alone_have_a_table_of_cover() {
-    let at = folder();
-    let out = at("report");
+    let at = Folder::new();
     let line = "compare builtin:capsule --methods cover:mood=outside,cover:mood=inside,qmat --spheres 12 \
-                --counts-only --samples 500 -q --out";
-    let table = |more: &[&str]| {
-        done(&[&words(line)[..], &[&out], more].concat());
-        fs::read_to_string(at("report/tables/overview-cover.md")).expect("a table")
+                --counts-only --samples 500 -q --out report";
+    let table = |more: &str| {
+        at.done(&format!("{line} {more}"));
+        at.text("report/tables/overview-cover.md")
     };
     let rows = |table: &str| table.lines().filter(|line| line.starts_with("| 12 |")).count();
     // Q-MAT's results have edges.
-    assert_eq!(rows(&table(&[])), 2);
-    let alone = table(&["--spheres-alone"]);
+    assert_eq!(rows(&table("")), 2);
+    let alone = table("--spheres-alone");
     assert_eq!(rows(&alone), 3, "{alone}");
-    for record in records(&out).iter().filter(|r| r["evaluate"]["counts"]["edges"] == 0) {
+    let records = at.records("report");
+    for record in records.iter().filter(|r| r["evaluate"]["counts"]["edges"] == 0) {
         let [uncovered, overshoot] =
             ["uncovered", "overshoot"].map(|side| &record["evaluate"]["cover"][side]["upper"]);
         match record["simplify"]["params"]["mood"].as_str() {
@@ -115,8 +112,8 @@ fn spheres_alone_have_a_table_of_cover() {
         }
         assert!(record["evaluate"]["structure"].is_null(), "{record}");
     }
-    assert!(fs::exists(at("report/plots/mesh-capsule-cover.svg")).expect("a folder"));
-    let page = fs::read_to_string(at("report/index.html")).expect("a page");
+    assert!(at.has("report/plots/mesh-capsule-cover.svg"));
+    let page = at.text("report/index.html");
     assert!(page.contains("Cover: one-sided errors"), "no table on the page");
 }
 
@@ -129,126 +126,102 @@ fn heads(stdout: &str) -> String {
 
 #[test]
 fn a_refused_mesh_and_an_unsupported_level_are_rows() {
-    let at = folder();
-    let (out, bad) = (at("report"), at("bad.off"));
-    fs::write(&bad, "OFF\n1 0 0\n0 0 0\n").expect("written");
-    let options = "--published --counts-only --spheres 20 --samples 500 --methods sat-pairwise";
-    let compare = ["compare", &bad, "builtin:sphere", "--out", &out];
-    let (code, object) = json(&[&compare[..], &words(options)].concat());
+    let at = Folder::new();
+    at.write("bad.off", "OFF\n1 0 0\n0 0 0\n");
+    let (code, object) = at.json(
+        "compare bad.off builtin:sphere --published --counts-only --spheres 20 --samples 500 --methods sat-pairwise \
+         --out report",
+    );
     let counts = ["refused", "unsupported", "ok"].map(|status| &object["status"][status]);
     assert_eq!((code, counts), (3, [&2.into(), &1.into(), &1.into()]));
     // The reason is printed even with --quiet, also of an earlier run.
-    let alone =
-        ["compare", &bad, "--methods", "qmat,angle", "--spheres", "20", "-q", "--out", &out];
     for _ in 0..2 {
-        let (code, _, stderr) = crate::command::run(&alone);
+        let line = "compare bad.off --methods qmat,angle --spheres 20 -q --out report";
+        let (code, _, stderr) = at.run(line);
         let lines: Vec<&str> = stderr.lines().collect();
         let is_reason = |line: &&str, method| line.starts_with(method) && line.contains("face");
         assert!(code == 5 && lines.len() == 3 && is_reason(&lines[1], "bad, qmat, 20"), "{stderr}");
     }
 }
 
-/// Cubes of 8 vertices, each at `x0 .. x0 + side`.
-fn cubes_off(cubes: &[(f64, f64)]) -> String {
-    const QUADS: [[usize; 4]; 6] =
-        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let (mut vertices, mut faces) = (String::new(), String::new());
-    for (k, (x0, side)) in cubes.iter().enumerate() {
-        for i in 0..8 {
-            let [x, y, z] = [0, 1, 2].map(|bit| side * f64::from(i >> bit & 1));
-            vertices += &format!("{} {y} {z}\n", x0 + x);
-        }
-        for [a, b, c, d] in QUADS.map(|quad| quad.map(|corner| 8 * k + corner)) {
-            faces += &format!("4 {a} {b} {c} {d}\n");
-        }
-    }
-    format!("OFF\n{} {} 0\n{vertices}{faces}", 8 * cubes.len(), 6 * cubes.len())
-}
-
 #[test]
 fn meshes_with_the_same_name_get_different_results() {
-    let at = folder();
+    let at = Folder::new();
     for (folder, side) in [("a", 1.0), ("b", 2.0)] {
-        fs::create_dir(at(folder)).expect("made");
-        fs::write(at(&format!("{folder}/x.off")), cubes_off(&[(0.0, side)])).expect("written");
+        fs::create_dir(at.at(folder)).expect("made");
+        at.write(format!("{folder}/x.off"), cubes_off(&[([0.0; 3], side)]));
     }
-    let (a, b, out) = (at("a/x.off"), at("b/x.off"), at("out"));
-    let mut common =
-        vec!["--methods", "qmat,qmat", "--spheres", "2", "--samples", "100", "--out", &out];
-    common.push("--counts-only");
-    let (code, object) = json(&[&["compare", &a, &b, &a], &common[..]].concat());
+    let compare = |meshes: &str| {
+        let options = "--methods qmat,qmat --spheres 2 --samples 100 --out out --counts-only";
+        at.json(&format!("compare {meshes} {options}"))
+    };
+    let (code, object) = compare("a/x.off b/x.off a/x.off");
     assert_eq!((code, &object["records"]), (0, &2.into()), "{object}");
-    let records = records(&out);
-    let artifact = |r: &Value| at(&format!("out/{}", r["artifact"].as_str().expect("a path")));
+    let records = at.records("out");
+    let artifact = |r: &Value| format!("out/{}", r["artifact"].as_str().expect("a path"));
     let artifacts: Vec<String> = records.iter().map(artifact).collect();
-    let [first, second] = [0, 1].map(|k| fs::read(&artifacts[k]).expect("written"));
-    assert_ne!(first, second);
+    assert_ne!(at.text(&artifacts[0]), at.text(&artifacts[1]));
 
     // A wrong word costs no earlier result, not even with --fresh.
-    let study = at("study.toml");
-    let named = "[[method]]\nid = \"qmat\"\nname = \"hem\"\nparams = { k = 0 }\n";
-    fs::write(&study, named).expect("written");
-    let wrong: [(&[&str], i32); 9] = [
-        (&["--samples", "99"], 2),
-        (&["--study", &study], 2),
-        (&["--methods", "qmat:k=x"], 2),
-        (&["--repeat", "0"], 2),
-        (&["--repeat", "1000000000000"], 2),
-        (&["--methods", "qmad"], 2),
-        (&["builtin:spere"], 2),
-        (&["builtin:sphere:1"], 2),
-        (&["no-such-file.off"], 1),
-    ];
-    for (words, code) in wrong {
-        refused(&[&["compare", &a, "--out", &out, "--fresh"], words].concat(), code, "");
-        assert_eq!(crate::command::records(&out), records);
+    at.write("study.toml", "[[method]]\nid = \"qmat\"\nname = \"hem\"\nparams = { k = 0 }\n");
+    for (words, code) in [
+        ("--samples 99", 2),
+        ("--study study.toml", 2),
+        ("--methods qmat:k=x", 2),
+        ("--repeat 0", 2),
+        ("--repeat 1000000000000", 2),
+        ("--methods qmad", 2),
+        ("builtin:spere", 2),
+        ("builtin:sphere:1", 2),
+        ("no-such-file.off", 1),
+    ] {
+        at.refused(&format!("compare a/x.off --out out --fresh {words}"), code, "");
+        assert_eq!(at.records("out"), records);
     }
-    assert_eq!(json(&[&["compare", "builtin:sphere:8"], &common[..]].concat()).0, 0);
-    assert!(artifacts.iter().all(|path| Path::new(path).exists()), "another run adds");
-    let fresh = [&["compare", "builtin:sphere:8", "--fresh"], &common[..]].concat();
-    assert_eq!(json(&fresh).1["records"], 1);
-    assert!(artifacts.iter().all(|path| !Path::new(path).exists()), "{artifacts:?}");
+    assert_eq!(compare("builtin:sphere:8").0, 0);
+    assert!(artifacts.iter().all(|path| at.has(path)), "another run adds");
+    assert_eq!(compare("builtin:sphere:8 --fresh").1["records"], 1);
+    assert!(!artifacts.iter().any(|path| at.has(path)), "{artifacts:?}");
 }
 
 #[test]
 fn empty_results_and_meshes_are_errors() {
-    let at = folder();
-    let (axis, empty, far) = (at("x.ma"), at("empty.ma"), at("far.off"));
-    for (method, level) in [("lambda", "1"), ("angle", "180")] {
-        let words = ["simplify", "builtin:sphere:8", "-m", method, "--level", level, "-o", &axis];
-        refused(&words, 3, "no sphere");
-        assert!(!Path::new(&axis).exists());
+    let at = Folder::new();
+    for level in ["lambda --level 1", "angle --level 180"] {
+        at.refused(&format!("simplify builtin:sphere:8 -o x.ma -m {level}"), 3, "no sphere");
+        assert!(!at.has("x.ma"));
     }
-    fs::write(&empty, "0 0 0\n").expect("written");
-    let words = ["simplify", "builtin:box", "-m", "angle", "--initial", &empty, "-o", &axis];
-    refused(&words, 1, "empty.ma");
+    at.write("empty.ma", "0 0 0\n");
+    at.refused("simplify builtin:box -m angle --initial empty.ma -o x.ma", 1, "empty.ma");
 
     // Two cubes that are far smaller than a billionth of the distance between them.
-    fs::write(&far, cubes_off(&[(0.0, 1.0), (1e12, 1.0)])).expect("written");
-    let words = ["axis", &far, "--sampling", "vertices"];
-    refused(&words, 1, "far.off");
-    refused(&words, 1, "billionth");
+    at.write("far.off", cubes_off(&[([0.0; 3], 1.0), ([1e12, 0.0, 0.0], 1.0)]));
+    at.refused("axis far.off --sampling vertices", 1, "far.off");
+    at.refused("axis far.off --sampling vertices", 1, "billionth");
 }
 
-/// A medial mesh of the built-in capsule with 20 spheres.
-fn of_another_program(file: &str) {
-    done(&["simplify", "builtin:capsule", "-m", "qmat", "--spheres", "20", "-o", file]);
+/// A folder with a medial mesh of the built-in capsule with 20 spheres.
+fn of_another_program() -> Folder {
+    let at = Folder::new();
+    at.done("simplify builtin:capsule -m qmat --spheres 20 -o theirs.ma");
+    at
 }
 
 #[test]
 fn external_results_are_rows_without_times() {
-    let at = folder();
-    let [file, copy, out] = ["theirs.ma", "copy.ma", "report"].map(&at);
-    of_another_program(&file);
-    fs::copy(&file, &copy).expect("a copy");
-    let (theirs, plus) = (format!("Q-MAT, theirs={file}"), format!("Q-MAT+={copy}"));
-    let words = ["compare", "builtin:capsule", "--methods", "qmat", "--counts-only"];
-    let given = ["--given", &theirs, "--given", &plus, "--samples", "500", "--out", &out];
-    let words = [&words[..], &given].concat();
-    let (code, object) = json(&words);
+    let at = of_another_program();
+    fs::copy(at.at("theirs.ma"), at.at("copy.ma")).expect("a copy");
+    let line =
+        "compare builtin:capsule --methods qmat --counts-only --samples 500 --out report --json";
+    let compare = || {
+        let mut command = at.command(line);
+        command.args(["--given", "Q-MAT, theirs=theirs.ma", "--given", "Q-MAT+=copy.ma"]);
+        json_of(ended(command.output().expect("it starts")))
+    };
+    let (code, object) = compare();
     assert_eq!(code, 0, "{object}");
     assert_eq!((&object["status"]["ok"], &object["status"]["external"]), (&1.into(), &2.into()));
-    let mut records = records(&out);
+    let mut records = at.records("report");
     // External results run first, in the order of the command line.
     records.rotate_left(2);
     let simplified = &records[0];
@@ -260,35 +233,31 @@ fn external_results_are_rows_without_times() {
         );
         assert!(record["simplify"]["seconds"].is_null(), "{record}");
         // Written with all digits and read again: the same errors but for rounding.
-        let [ours, given] =
-            [simplified, record].map(|r| r["evaluate"]["hausdorff"].as_f64().expect("measured"));
+        let [ours, given] = [simplified, record].map(|r| number(&r["evaluate"]["hausdorff"]));
         assert!((ours - given).abs() < 1e-12, "{ours} {given}");
     }
-    let (_, again) = json(&words);
+    let (_, again) = compare();
     assert_eq!((&again["run"], &again["found"]), (&0.into(), &3.into()));
 }
 
 #[test]
 fn external_results_without_a_mesh_are_refused_before_any_run() {
-    let at = folder();
-    let [file, out] = ["theirs.ma", "report"].map(&at);
-    of_another_program(&file);
-    for (given, meshes, why) in [
-        (format!("a={file}"), &["builtin:capsule", "builtin:box"][..], "--given a@capsule="),
-        (format!("a@sphere={file}"), &["builtin:capsule"], "unknown mesh `sphere`"),
-        ("a=nowhere.ma".to_owned(), &["builtin:capsule"], "nowhere.ma"),
-        (file.clone(), &["builtin:capsule"], "expected NAME=FILE.ma"),
+    let at = of_another_program();
+    for (words, why) in [
+        ("builtin:box --given a=theirs.ma", "--given a@capsule="),
+        ("--given a@sphere=theirs.ma", "unknown mesh `sphere`"),
+        ("--given a=nowhere.ma", "nowhere.ma"),
+        ("--given theirs.ma", "expected NAME=FILE.ma"),
     ] {
-        refused(&[&["compare"], meshes, &["--given", &given, "--out", &out]].concat(), 2, why);
-        assert!(!Path::new(&out).exists(), "{given}");
+        at.refused(&format!("compare builtin:capsule {words} --out report"), 2, why);
+        assert!(!at.has("report"), "{words}");
     }
 }
 
 /// Values that no run can have, and names that no table can show.
 #[test]
 fn faults_of_a_study_are_refused_before_any_run() {
-    let at = folder();
-    let (file, out) = (at("study.toml"), at("report"));
+    let at = Folder::new();
     let long = "n".repeat(100_000);
     let method = |text: &str| format!("[[method]]\nid = \"angle\"\n{text}");
     for (text, code, why) in [
@@ -300,12 +269,6 @@ fn faults_of_a_study_are_refused_before_any_run() {
         (method("name = \"a\\u001b[2Jb\""), 1, "invalid name (found \"a\\u{1b}[2Jb\""),
         (method(&format!("name = \"{long}\"")), 1, "invalid name (found \"nnn"),
         ("[[given]]\nname = \"\"\nfile = \"a.ma\"".to_owned(), 1, "invalid name (found \"\""),
-        ("[groups]\n\"\" = [\"box\"]".to_owned(), 1, "invalid name (found \"\""),
-        (
-            "[groups]\nCAD = [\"bracket\", \"bracet\"]".to_owned(),
-            2,
-            "group \"CAD\": unknown mesh \"bracet\"",
-        ),
         (format!("{long} = 1"), 1, "study.toml: line 1: unknown field `nnn"),
         ("spheres = [1,\nmeshes = 3".to_owned(), 1, "study.toml: line "),
         (format!("meshes = []\nspheres = \"{long}\""), 1, "study.toml: line 2: invalid type"),
@@ -318,20 +281,17 @@ fn faults_of_a_study_are_refused_before_any_run() {
         ("meshes = [\"nowhere.off\"]".to_owned(), 1, "nowhere.off"),
         ("plugins = [\"nowhere.toml\"]".to_owned(), 2, "nowhere.toml"),
     ] {
-        fs::write(&file, text).expect("written");
-        let words = ["compare", "--study", &file, "--out", &out];
-        let (found, _, message) = crate::command::run(&words);
+        at.write("study.toml", text);
+        let (found, _, message) = at.run("compare --study study.toml --out report");
         assert!(found == code && message.contains(why), "{found}: {message:.2000}");
         assert!(
             message.len() < 1_500 && message.trim_end().lines().count() == 1,
             "{message:.2000}"
         );
-        assert!(!Path::new(&out).exists());
+        assert!(!at.has("report"));
     }
     for level in ["nan", "inf", "-inf", "1e999"] {
-        let levels = format!("angle={level}");
-        let words =
-            ["compare", "builtin:box", "--methods", "angle", "--levels", &levels, "--out", &out];
-        refused(&words, 2, "expected a finite number");
+        let line = format!("compare builtin:box --methods angle --levels angle={level}");
+        at.refused(&line, 2, "expected a finite number");
     }
 }

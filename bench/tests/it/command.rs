@@ -5,19 +5,89 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use serde_json::Value;
+use tempfile::TempDir;
 
 /// The command.
 pub const MEDIAL: &str = env!("CARGO_BIN_EXE_medial");
 
-/// The words of a command line without quotes. Temporary folders have no space in their names.
-pub fn words(line: &str) -> Vec<&str> {
-    line.split_whitespace().collect()
+/// A temporary folder in which the command runs, or the same with other methods. A line has its words without quotes,
+/// and the names of files in it are relative to the folder.
+pub struct Folder {
+    dir: TempDir,
+    program: PathBuf,
 }
 
-/// A temporary folder as the texts of paths in it, which goes with the function.
-pub fn folder() -> impl Fn(&str) -> String {
-    let dir = tempfile::tempdir().expect("a folder");
-    move |name| text_path(&dir.path().join(name)).to_owned()
+impl Folder {
+    /// An empty folder for the command.
+    pub fn new() -> Self {
+        Self::of(MEDIAL)
+    }
+
+    /// An empty folder for a program that is the command with other methods.
+    pub fn of(program: impl Into<PathBuf>) -> Self {
+        Self { dir: tempfile::tempdir().expect("a folder"), program: program.into() }
+    }
+
+    /// The path of a file there.
+    pub fn at(&self, name: impl AsRef<Path>) -> PathBuf {
+        self.dir.path().join(name)
+    }
+
+    /// Whether a file is there.
+    pub fn has(&self, name: impl AsRef<Path>) -> bool {
+        self.at(name).exists()
+    }
+
+    /// Writes a file.
+    #[track_caller]
+    pub fn write(&self, name: impl AsRef<Path>, content: impl AsRef<[u8]>) {
+        fs::write(self.at(name), content).expect("written");
+    }
+
+    /// The content of a file.
+    #[track_caller]
+    pub fn text(&self, name: impl AsRef<Path>) -> String {
+        let path = self.at(name);
+        fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+    }
+
+    /// The records of a store.
+    pub fn records(&self, store: &str) -> Vec<Value> {
+        records(self.at(store))
+    }
+
+    /// The command of a line, to which more may be added.
+    pub fn command(&self, line: &str) -> Command {
+        let mut command = Command::new(&self.program);
+        command.args(line.split_whitespace()).current_dir(&self.dir);
+        command
+    }
+
+    /// Runs a line and returns its exit code and both outputs.
+    pub fn run(&self, line: &str) -> (i32, String, String) {
+        ended(self.command(line).output().expect("the command starts"))
+    }
+
+    /// Runs a line that must succeed, and returns its standard output.
+    #[track_caller]
+    pub fn done(&self, line: &str) -> String {
+        let (code, stdout, stderr) = self.run(line);
+        assert_eq!(code, 0, "{line}: {stderr}");
+        stdout
+    }
+
+    /// Runs a line that must end in this code and with these words on standard error.
+    #[track_caller]
+    pub fn refused(&self, line: &str, expected: i32, words: &str) {
+        let (code, _, stderr) = self.run(line);
+        assert!(code == expected && stderr.contains(words), "{line}: {code}, {stderr}");
+    }
+
+    /// Runs a line with `--json` and returns its exit code and the one object that it prints.
+    #[track_caller]
+    pub fn json(&self, line: &str) -> (i32, Value) {
+        json_of(self.run(&format!("{line} --json")))
+    }
 }
 
 /// The exit code and both outputs of a process that no signal ended.
@@ -28,51 +98,13 @@ pub fn ended(output: Output) -> (i32, String, String) {
     (code, stdout, stderr)
 }
 
-/// Runs a program and returns its exit code and both outputs.
-pub fn run_program(program: impl AsRef<Path>, arguments: &[&str]) -> (i32, String, String) {
-    let output = Command::new(program.as_ref()).args(arguments).output();
-    ended(output.unwrap_or_else(|error| panic!("{}: {error}", program.as_ref().display())))
-}
-
-/// Runs the command and returns its exit code and both outputs.
-pub fn run(arguments: &[&str]) -> (i32, String, String) {
-    run_program(MEDIAL, arguments)
-}
-
-/// Runs the command, which must succeed, and returns its standard output.
+/// The exit code and the one object of a run with `--json`.
 #[track_caller]
-pub fn done(arguments: &[&str]) -> String {
-    let (code, stdout, stderr) = run(arguments);
-    assert_eq!(code, 0, "{arguments:?}: {stderr}");
-    stdout
-}
-
-/// Runs the command, which must end in this code and with these words on standard error.
-#[track_caller]
-pub fn refused(arguments: &[&str], expected: i32, words: &str) {
-    let (code, _, stderr) = run(arguments);
-    assert!(code == expected && stderr.contains(words), "{arguments:?}: {code}, {stderr}");
-}
-
-/// Runs the command with `--json` and returns its exit code and the one object it prints.
-#[track_caller]
-pub fn json(arguments: &[&str]) -> (i32, Value) {
-    json_of(MEDIAL, arguments)
-}
-
-/// [`json`] of a program that is the command with other methods.
-#[track_caller]
-pub fn json_of(program: impl AsRef<Path>, arguments: &[&str]) -> (i32, Value) {
-    let (code, stdout, stderr) = run_program(program, &[arguments, &["--json"]].concat());
+pub fn json_of((code, stdout, stderr): (i32, String, String)) -> (i32, Value) {
     assert_eq!(stdout.lines().count(), 1, "one line of JSON: {stdout}\n{stderr}");
     let object: Value = serde_json::from_str(&stdout).expect("JSON");
     assert!(object["warnings"].is_array() && object["version"].is_string(), "{object}");
     (code, object)
-}
-
-/// A path that is UTF-8.
-pub fn text_path(path: &Path) -> &str {
-    path.to_str().expect("a UTF-8 path")
 }
 
 /// The command with methods that go wrong, which cargo builds with its tests.
@@ -90,6 +122,12 @@ pub fn records(out: impl AsRef<Path>) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).expect("a whole record")).collect()
 }
 
+/// A field that is a number.
+#[track_caller]
+pub fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
+}
+
 /// Records without the fields that differ from run to run: seconds, memory, the command, and the number of jobs.
 pub fn without_timings(mut records: Vec<Value>) -> Vec<Value> {
     for record in &mut records {
@@ -104,6 +142,23 @@ pub fn without_timings(mut records: Vec<Value>) -> Vec<Value> {
     }
     records.sort_by_key(|record| record["key"].as_str().map(str::to_owned));
     records
+}
+
+/// Cubes of 8 vertices and 6 squares, each a lowest corner and a side, as OFF.
+pub fn cubes_off(cubes: &[([f64; 3], f64)]) -> String {
+    const QUADS: [[usize; 4]; 6] =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let (mut vertices, mut faces) = (String::new(), String::new());
+    for (k, (low, side)) in cubes.iter().enumerate() {
+        for i in 0..8 {
+            let [x, y, z] = [0, 1, 2].map(|bit| low[bit] + side * f64::from(i >> bit & 1));
+            vertices += &format!("{x} {y} {z}\n");
+        }
+        for [a, b, c, d] in QUADS.map(|quad| quad.map(|corner| 8 * k + corner)) {
+            faces += &format!("4 {a} {b} {c} {d}\n");
+        }
+    }
+    format!("OFF\n{} {} 0\n{vertices}{faces}", 8 * cubes.len(), 6 * cubes.len())
 }
 
 /// Ids of the processes with a text in the command line; none on systems without `/proc`.

@@ -1,67 +1,56 @@
 //! `medial diff`: exit codes, and two builds that run alternately.
 
-use std::fs;
-use std::path::Path;
+use serde_json::{Value, json};
 
-use serde_json::Value;
-
-use crate::command::{MEDIAL, done, folder, json, records, refused, run};
-
-/// Changes the Hausdorff error of the last record of a folder.
-fn worsen(folder: &str, factor: f64) {
-    let mut lines = records(folder);
-    let error = &mut lines.last_mut().unwrap()["evaluate"]["hausdorff"];
-    *error = (error.as_f64().unwrap() * factor).into();
-    let lines: Vec<String> = lines.iter().map(Value::to_string).collect();
-    let path = Path::new(folder).join("results.jsonl");
-    fs::write(path, lines.join("\n") + "\n").unwrap();
-}
+use crate::command::{Folder, MEDIAL, number};
 
 #[test]
 fn two_folders_are_compared() {
-    let at = folder();
-    let [old, new] = ["old", "new"].map(&at);
-    let common = ["--methods", "pmat,angle", "--spheres", "30", "--counts-only", "-q", "--out"];
-    for out in [&old, &new] {
-        done(&[&["compare", "builtin:torus:24"], &common[..], &[out]].concat());
+    let at = Folder::new();
+    let line = "compare builtin:torus:24 --methods pmat,angle --spheres 30 --counts-only -q --out";
+    for out in ["old", "new"] {
+        at.done(&format!("{line} {out}"));
     }
-    let printed = done(&["diff", &old, &new]);
+    let printed = at.done("diff old new");
     assert!(printed.starts_with("# No regression") && printed.contains("2 results"), "{printed}");
 
-    worsen(&new, 1.01);
-    let (code, object) = json(&["diff", &old, &new]);
+    // The error of the last result rises by 1 %.
+    let mut lines = at.records("new");
+    let error = &mut lines.last_mut().expect("a record")["evaluate"]["hausdorff"];
+    *error = (number(error) * 1.01).into();
+    let lines: Vec<String> = lines.iter().map(Value::to_string).collect();
+    at.write("new/results.jsonl", lines.join("\n") + "\n");
+    let (code, object) = at.json("diff old new");
     assert_eq!((code, object["changes"][0]["what"].as_str()), (4, Some("evaluate.hausdorff")));
-    let printed = done(&["diff", &old, &new, "--error", "0.02"]);
+    let printed = at.done("diff old new --error 0.02");
     assert!(printed.contains("Changed otherwise: 1 change"), "{printed}");
-    let printed = done(&["diff", &new, &old]);
+    let printed = at.done("diff new old");
     assert!(printed.contains("1 improvement"), "{printed}");
-    refused(&["diff", &old, "no-such-folder"], 1, "no-such-folder");
-    refused(&["diff", &old, &new, "--error", "nan"], 2, "--error");
+    at.refused("diff old no-such-folder", 1, "no-such-folder");
+    at.refused("diff old new --error nan", 2, "--error");
 }
 
 #[test]
 fn two_builds_take_turns() {
-    let at = folder();
-    let (study, out) = (at("study.toml"), at("out"));
+    let at = Folder::new();
     let text = "meshes = [\"builtin:torus:24\"]\nspheres = [30]\ncounts_only = true\n[[method]]\nid = \"pmat\"\n";
-    fs::write(&study, text).unwrap();
-    let options = ["--study", &study, "--out", &out, "--repeat", "5", "-q"];
-    let arguments = [&["diff", "--run", MEDIAL, MEDIAL], &options[..]].concat();
-    let first = run(&arguments);
+    at.write("study.toml", text);
+    let diff = |old: &str, new: &str, out: &str| {
+        format!("diff --run {old} {new} --study study.toml --out {out} --repeat 5 -q")
+    };
+    let line = diff(MEDIAL, MEDIAL, "out");
+    let first = at.run(&line);
     // On a busy machine one build may be slower, but exact quantities are equal.
     assert!(first.0 == 0 || first.0 == 4, "{first:?}");
-    let diff: Value = serde_json::from_slice(&fs::read(at("out/diff.json")).unwrap()).unwrap();
-    assert_eq!(
-        (diff["compared"].as_u64(), diff["changes"].as_array().unwrap().len()),
-        (Some(1), 0)
-    );
+    let found: Value = serde_json::from_str(&at.text("out/diff.json")).expect("JSON");
+    assert_eq!([&found["compared"], &found["changes"]], [&json!(1), &json!([])]);
     for side in ["out/old", "out/new"] {
-        assert_eq!(records(at(side))[0]["repetitions"].as_array().unwrap().len(), 5);
+        assert_eq!(at.records(side)[0]["repetitions"].as_array().map(Vec::len), Some(5));
     }
     // All results exist: nothing runs again.
-    assert_eq!(run(&arguments), first);
-    let foreign = [&["diff", "--run", "/bin/echo", MEDIAL], &options[..]].concat();
-    refused(&foreign, 1, "echo: not a build of medial (`--version` printed \"");
+    assert_eq!(at.run(&line), first);
+    let why = "echo: not a build of medial (`--version` printed \"";
+    at.refused(&diff("/bin/echo", MEDIAL, "out"), 1, why);
     // Programs with the name of the command that are no workers, or those of another protocol.
     for (k, (script, found)) in [
         ("exit 0", "the process ended with exit code 0"),
@@ -71,16 +60,15 @@ fn two_builds_take_turns() {
     .into_iter()
     .enumerate()
     {
-        let (program, out) = (at(&format!("foreign-{k}")), at(&format!("out-{k}")));
+        let program = at.at(format!("foreign-{k}"));
         let text =
             format!("#!/bin/sh\n[ \"$1\" = --version ] && echo medial 0.1.0 && exit\n{script}\n");
-        fs::write(&program, text).unwrap();
+        at.write(&program, text);
         #[cfg(unix)]
-        fs::set_permissions(&program, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
-        let foreign = ["diff", "--run", MEDIAL, &program, "--study", &study, "--out", &out, "-q"];
-        let expected = format!("foreign-{k}: not a worker of this build (found {found}, expected");
-        refused(&foreign, 1, &expected);
+        std::fs::set_permissions(&program, std::os::unix::fs::PermissionsExt::from_mode(0o755))
+            .expect("permitted");
+        let why = format!("foreign-{k}: not a worker of this build (found {found}, expected");
+        at.refused(&diff(MEDIAL, &program.to_string_lossy(), &format!("out-{k}")), 1, &why);
     }
-    let here = ["diff", "--run", MEDIAL, MEDIAL, "--study", &study, "--out", &at(".")];
-    refused(&here, 1, "neither empty nor a folder of results");
+    at.refused(&diff(MEDIAL, MEDIAL, "."), 1, "neither empty nor a folder of results");
 }

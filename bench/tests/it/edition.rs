@@ -11,28 +11,24 @@ use medial_run::input::{Input, Source};
 use medial_run::journal::{read_records, write_records};
 use serde_json::{Value, json};
 
-use crate::command::{done, folder, json, refused, words};
+use crate::command::Folder;
 
 /// The line of a method in a printed table, as words.
 fn row<'o>(stdout: &'o str, method: &str) -> Option<Vec<&'o str>> {
-    stdout.lines().find_map(|line| Some(words(line.strip_prefix(method)?)))
+    stdout.lines().find_map(|line| Some(line.strip_prefix(method)?.split_whitespace().collect()))
 }
 
 #[test]
 fn frozen_rows_are_matched_by_content_and_not_run() {
-    let at = folder();
-    let [surface, same, edition] = ["a.off", "b.off", "test.1"].map(&at);
-    done(&["datasets", "make", "capsule", "-o", &surface]);
-    fs::copy(&surface, &same).expect("copied");
-    let study = words("--spheres 50,20 --samples 500 --counts-only");
-    let compare = |words: &[&str], out: &str| {
-        done(&[&["compare"], words, &study[..], &["--out", &at(out)]].concat())
-    };
-    compare(&[&surface, "builtin:sphere", "--methods", "qmat,angle"], "test.1");
+    let at = Folder::new();
+    at.done("datasets make capsule -o a.off");
+    fs::copy(at.at("a.off"), at.at("b.off")).expect("copied");
+    let study = "--spheres 50,20 --samples 500 --counts-only --out";
+    at.done(&format!("compare a.off builtin:sphere --methods qmat,angle {study} test.1"));
 
-    let own = [&same, "builtin:box", "--methods", "qmat,qmat:k=0", "--against", &edition];
-    let stdout = compare(&own, "own");
-    let records = crate::command::records(at("own"));
+    let own = format!("compare b.off builtin:box --methods qmat,qmat:k=0 {study} own");
+    let stdout = at.done(&format!("{own} --against ./test.1"));
+    let records = at.records("own");
     assert!(records.len() == 8 && records.iter().all(|r| r["simplify"]["method"] == "qmat"));
     // Its seconds are in the last column alone; equal results of `qmat` have one row.
     let angle = row(&stdout, "angle (test.1)").expect("a row");
@@ -41,31 +37,26 @@ fn frozen_rows_are_matched_by_content_and_not_run() {
     for note in ["1 mesh is not in edition test.1", ": box;", "has 1 of the 2 meshes"] {
         assert!(stdout.contains(note), "{note}: {stdout}");
     }
-    let table = |name: &str| fs::read_to_string(at(name)).expect("a table");
-    let csv = table("own/results.csv");
+    let csv = at.text("own/results.csv");
     assert!(csv.contains("frozen_seconds_total") && !csv.contains("\nbox,"), "{csv}");
-    assert!(table("own/tables/mesh-b.md").contains("angle (test.1)"));
-    assert!(!table("own/plots/mesh-b-time.svg").contains("angle"));
+    assert!(at.text("own/tables/mesh-b.md").contains("angle (test.1)"));
+    assert!(!at.text("own/plots/mesh-b-time.svg").contains("angle"));
     // The study of the store has the edition, so a rebuilt report is the same.
-    let page = table("own/index.html");
-    done(&["report", &at("own")]);
-    assert!(page.contains("frozen results of edition test.1") && page == table("own/index.html"));
-    let (_, object) = json(&[&["compare"], &own[..4], &study, &["--out", &at("own")]].concat());
-    assert!(object["run"] == 0 && !table("own/index.html").contains("(test.1)"), "{object}");
+    let page = at.text("own/index.html");
+    at.done("report own");
+    assert!(page.contains("frozen results of edition test.1") && page == at.text("own/index.html"));
+    let (_, object) = at.json(&own);
+    assert!(object["run"] == 0 && !at.text("own/index.html").contains("(test.1)"), "{object}");
 }
 
 #[test]
 fn rows_of_other_versions_are_marked() {
-    let at = folder();
-    let edition = at("test.1");
-    let study = words("--spheres 20 --samples 500 --counts-only");
-    let compare = |words: &[&str], out: &str| {
-        done(&[&["compare", "builtin:capsule"], words, &study[..], &["--out", &at(out)]].concat())
-    };
-    compare(&["--methods", "qmat,pmat,angle,lambda"], "test.1");
+    let at = Folder::new();
+    let line = "compare builtin:capsule --spheres 20 --samples 500 --counts-only";
+    at.done(&format!("{line} --methods qmat,pmat,angle,lambda --out test.1"));
     // `qmat` with another error and `angle` are of other versions; `pmat` is of another one with the same result.
-    let results = at("test.1/results.jsonl");
-    let mut records = read_records(Path::new(&results)).expect("records").records;
+    let results = at.at("test.1/results.jsonl");
+    let mut records = read_records(&results).expect("records").records;
     for record in &mut records {
         if record.simplify.method != "lambda" {
             record.method_version = "0".repeat(64);
@@ -75,11 +66,10 @@ fn rows_of_other_versions_are_marked() {
             record.evaluate.as_mut().expect("measured").distances.hausdorff /= 2.0;
         }
     }
-    write_records(Path::new(&results), &records).expect("written");
+    write_records(&results, &records).expect("written");
 
-    let stdout = compare(&["--methods", "qmat,pmat", "--against", &edition], "own");
-    let page = fs::read_to_string(at("own/index.html")).expect("a page");
-    let table = fs::read_to_string(at("own/tables/mesh-capsule.md")).expect("a table");
+    let stdout = at.done(&format!("{line} --methods qmat,pmat --against ./test.1 --out own"));
+    let [page, table] = ["own/index.html", "own/tables/mesh-capsule.md"].map(|name| at.text(name));
     let note = "qmat: 1 of 1 results differ from those of edition test.1. Hausdorff error here ÷ there: 2.00";
     for text in [&stdout, &page, &table] {
         for (row, is_there) in [
@@ -98,24 +88,21 @@ fn rows_of_other_versions_are_marked() {
 
 #[test]
 fn editions_that_do_not_compare_are_refused_before_any_run() {
-    let at = folder();
-    let edition = at("test.1");
-    let frozen =
-        "compare builtin:capsule --methods pmat --spheres 20 --samples 500 --counts-only -q --out";
-    done(&[&words(frozen)[..], &[&edition]].concat());
-    let against = |line: &str, code: i32, message: &str| {
-        let line = format!("compare {line} --methods pmat --spheres 20 --out {}", at("own"));
-        refused(&words(&line), code, message);
-        assert!(!Path::new(&at("own")).exists(), "nothing is written");
+    let at = Folder::new();
+    at.done("compare builtin:capsule --methods pmat --spheres 20 --samples 500 --counts-only -q --out test.1");
+    let refused = |line: &str, edition: &str, code: i32, message: &str| {
+        let line = format!("compare {line} --against {edition} --methods pmat --spheres 20");
+        at.refused(&format!("{line} --out own"), code, message);
+        assert!(!at.has("own"), "nothing is written");
     };
-    let named = |line: &str| format!("{line} --against {edition}");
-    against(&named("builtin:capsule"), 2, "--samples 10000: edition test.1 was measured with 500");
-    let seeded = named("builtin:capsule --samples 500 --seed 1");
-    against(&seeded, 2, "--seed 1: edition test.1");
-    against(&named("builtin:box --samples 500"), 2, "no mesh of this comparison");
-    against("builtin:capsule --against 2027.11", 2, "did you mean `2027.1`?");
-    fs::write(at("test.1/results.jsonl"), "").expect("written");
-    against(&named("builtin:capsule --samples 500"), 1, "test.1: no record");
+    let samples = "--samples 10000: edition test.1 was measured with 500";
+    refused("builtin:capsule", "./test.1", 2, samples);
+    let seeded = "builtin:capsule --samples 500 --seed 1";
+    refused(seeded, "./test.1", 2, "--seed 1: edition test.1");
+    refused("builtin:box --samples 500", "./test.1", 2, "no mesh of this comparison");
+    refused("builtin:capsule", "2027.11", 2, "did you mean `2027.1`?");
+    at.write("test.1/results.jsonl", "");
+    refused("builtin:capsule --samples 500", "./test.1", 1, "test.1: no record");
 }
 
 #[test]

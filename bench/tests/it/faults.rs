@@ -6,17 +6,22 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::command::{
-    MEDIAL, done, ended, faulty, folder, json, processes_with, records, run_program, words,
-};
+use crate::command::{Folder, ended, faulty, number, processes_with};
 
 /// Runs `compare` of the faulty methods on a box, which must end in a code, and returns its records.
 #[track_caller]
-fn compare(line: &str, out: &str, expected: i32) -> Vec<Value> {
-    let common = ["compare", "builtin:box:8", "--counts-only", "--quiet", "--out", out];
-    let (code, _, stderr) = run_program(faulty(), &[&common[..], &words(line)].concat());
-    assert_eq!(code, expected, "{stderr}");
-    records(out)
+fn compare(line: &str, expected: i32) -> Vec<Value> {
+    compare_in(&Folder::of(faulty()), line, expected)
+}
+
+#[track_caller]
+fn compare_in(at: &Folder, line: &str, expected: i32) -> Vec<Value> {
+    at.refused(
+        &format!("compare builtin:box:8 --counts-only --quiet --out out {line}"),
+        expected,
+        "",
+    );
+    at.records("out")
 }
 
 /// Status and reason by method and number of spheres.
@@ -32,13 +37,13 @@ fn ends(records: &[Value]) -> BTreeMap<(String, u64), (String, String)> {
 
 #[test]
 fn faults_of_methods_are_contained_and_named() {
-    let at = folder();
+    let at = Folder::of(faulty());
     let common = "--spheres 30,20,10 --samples 100 --memory 1500 --methods";
     let methods =
         "panics,allocates,grows,overflows,aborts,exits,invalid,empty,talks,orphans,complains,qmat";
     // Methods that end by themselves, or by their memory, may take longer on a busy machine.
-    compare(&format!("--timeout 60 {common} {methods}"), &at("out"), 3);
-    let ends = ends(&compare(&format!("--timeout 10 {common} loops"), &at("out"), 3));
+    compare_in(&at, &format!("--timeout 60 {common} {methods}"), 3);
+    let ends = ends(&compare_in(&at, &format!("--timeout 10 {common} loops"), 3));
     let end = |method: &str, spheres| &ends[&(method.to_owned(), spheres)];
     // Levels before the fault have results, and levels after it have the reason for which they did not run.
     let broken_at_20 = [
@@ -76,7 +81,7 @@ fn faults_of_methods_are_contained_and_named() {
 #[test]
 fn a_nondeterministic_method_gives_a_warning() {
     let line = "--methods random,qmat --spheres 30 --repeat 3 --samples 100";
-    for record in compare(line, &folder()("out"), 0) {
+    for record in compare(line, 0) {
         assert_eq!(record["repetitions"].as_array().map(Vec::len), Some(3));
         let warnings = record["simplify"]["warnings"].to_string();
         let random = record["simplify"]["method"] == "random";
@@ -86,21 +91,18 @@ fn a_nondeterministic_method_gives_a_warning() {
 
 #[test]
 fn the_error_of_a_bound_is_that_of_the_result() {
-    let at = folder();
-    let (mesh, file) = (at("box.off"), at("x.ma"));
-    done(&["datasets", "make", "box", "--resolution", "8", "-o", &mesh]);
+    let at = Folder::of(faulty());
+    at.done("datasets make box --resolution 8 -o box.off");
     // A level of `forgets` has fewer spheres alone than in the search. One that is within the bound alone, too, is
     // written, and what is printed is its error.
     for (method, certify) in [("forgets", false), ("forgets", true), ("qmat", false)] {
-        let line = format!("simplify {mesh} -m {method} --max-error 0.2 --json -o {file}");
-        let certifying: &[&str] = if certify { &["--certify"] } else { &[] };
-        let (code, stdout, stderr) = run_program(faulty(), &[&words(&line), certifying].concat());
-        assert_eq!(code, 0, "{stdout}{stderr}");
-        let object: Value = serde_json::from_str(&stdout).expect("JSON");
-        let of_file = json(&["evaluate", &mesh, &file, "--certify", "0.001"]).1;
+        let certifying = if certify { "--certify" } else { "" };
+        let line = format!("simplify box.off -m {method} --max-error 0.2 -o x.ma {certifying}");
+        let (code, object) = at.json(&line);
+        assert_eq!(code, 0, "{object}");
+        let of_file = at.json("evaluate box.off x.ma --certify 0.001").1;
         let printed = &object["max_error"];
         assert_eq!(printed["spheres"], of_file["counts"]["spheres"], "{object}");
-        let number = |value: &Value| value.as_f64().expect("a number");
         let (error, own) = (number(&printed["hausdorff"]), number(&of_file["hausdorff"]));
         if certify {
             let [lower, upper] = ["lower", "upper"].map(|end| number(&of_file["certified"][end]));
@@ -112,7 +114,7 @@ fn the_error_of_a_bound_is_that_of_the_result() {
     }
     // No level of `warms-up` is within the bound alone.
     let line = "--methods warms-up --max-error 0.3 --spheres 30 --samples 500";
-    let records = compare(line, &at("out"), 0);
+    let records = compare(line, 0);
     let missed = records.iter().find(|record| record["simplify"]["level"]["max_error"] == 0.3);
     assert_eq!(missed.expect("a record")["status"], "bound_missed");
 }
@@ -121,22 +123,23 @@ fn the_error_of_a_bound_is_that_of_the_result() {
 #[cfg(target_os = "linux")]
 fn the_memory_of_a_worker_that_sends_events_is_limited() {
     let line = "--methods chatters --spheres 30 --samples 100 --timeout 60 --memory 1000";
-    let ends = ends(&compare(line, &folder()("out"), 5));
+    let ends = ends(&compare(line, 5));
     let (status, reason) = &ends[&("chatters".to_owned(), 30)];
     assert!(status == "out_of_memory" && reason.contains("1000 MB"), "{status}, {reason}");
 }
 
 #[test]
 fn a_panic_of_the_command_is_a_failure_of_one_line() {
-    let at = folder();
+    let at = Folder::of(faulty());
     // Of the command, where methods are listed, and of a method.
     let lines = ["methods", "simplify builtin:box:8 -m panics --spheres 20 --json"];
     for (line, message) in lines.into_iter().zip(["FAULTY_INFO", "panics at 20 spheres"]) {
         let run = |backtrace: &str| {
-            let mut command = Command::new(faulty());
-            command.args(words(line)).env("RUST_BACKTRACE", backtrace);
-            let command =
-                if line == "methods" { command.env("FAULTY_INFO", at("")) } else { &mut command };
+            let mut command = at.command(line);
+            command.env("RUST_BACKTRACE", backtrace);
+            if line == "methods" {
+                command.env("FAULTY_INFO", at.at(""));
+            }
             ended(command.output().expect("it starts"))
         };
         let (code, _, stderr) = run("0");
@@ -147,24 +150,23 @@ fn a_panic_of_the_command_is_a_failure_of_one_line() {
     }
 }
 
-/// A plug-in file with faulty programs, each a line for `sh`.
-fn plugins(at: &impl Fn(&str) -> String, programs: &[(&str, &str)]) -> String {
+/// Writes `plugins.toml` with faulty programs, each a line for `sh`.
+fn plugins(at: &Folder, programs: &[(&str, &str)]) {
     let mut text = String::new();
     for (id, script) in programs {
-        fs::write(at(&format!("{id}.sh")), script).expect("written");
+        at.write(format!("{id}.sh"), script);
         text += &format!(
             "[[method]]\nid = \"{id}\"\ntitle = \"{id}\"\nlevels = [\"spheres\"]\n\
              command = [\"sh\", \"{id}.sh\", \"{{initial}}\", \"{{output}}\", \"{{spheres}}\"]\n"
         );
     }
-    fs::write(at("plugins.toml"), text).expect("written");
-    at("plugins.toml")
+    at.write("plugins.toml", text);
 }
 
 #[test]
 #[cfg(unix)]
 fn faults_of_programs_are_contained_and_named() {
-    let at = folder();
+    let at = Folder::of(faulty());
     let programs = [
         ("p-loops", "while :; do sleep 1; done"),
         ("p-garbage", "head -c 100000 /dev/urandom > \"$2\""),
@@ -179,11 +181,11 @@ fn faults_of_programs_are_contained_and_named() {
         ("p-killer", "kill -9 $PPID; sleep 5"),
         ("p-fine", "cp \"$1\" \"$2\""),
     ];
-    let (file, methods) = (plugins(&at, &programs), programs.map(|(id, _)| id).join(","));
-    let line = format!(
-        "--methods {methods} --spheres 20 --plugins {file} --samples 100 --timeout 10 --memory 1500"
-    );
-    let records = compare(&line, &at("out"), 3);
+    plugins(&at, &programs);
+    let methods = programs.map(|(id, _)| id).join(",");
+    let limits = "--samples 100 --timeout 10 --memory 1500";
+    let line = format!("--methods {methods} --spheres 20 --plugins plugins.toml {limits}");
+    let records = compare_in(&at, &line, 3);
     let ends = ends(&records);
     let expected = [
         ("p-loops", "timed_out", "--timeout"),
@@ -212,19 +214,18 @@ fn faults_of_programs_are_contained_and_named() {
 #[test]
 #[cfg(target_os = "linux")]
 fn only_the_tree_of_the_worker_ends_with_it() {
-    let at = folder();
-    let (out, pid, program) = (at("out"), at("pid"), faulty());
+    let at = Folder::of("bash");
     // The shell's other child becomes a child of the command by `exec`. It must not hold the pipes of
     // the command, because the test waits for their end.
     let script = format!(
-        "sleep 7777 > /dev/null 2>&1 & echo $! > '{pid}'; exec '{}' compare builtin:box:8 --methods loops --spheres 20 \
-         --counts-only --samples 100 --timeout 2 --quiet --out '{out}'",
-        program.display()
+        "sleep 7777 > /dev/null 2>&1 & echo $! > pid; exec '{}' compare builtin:box:8 --methods loops --spheres 20 \
+         --counts-only --samples 100 --timeout 2 --quiet --out out",
+        faulty().display()
     );
-    let (code, _, stderr) = run_program("bash", &["-c", &script]);
+    let (code, _, stderr) = ended(at.command("-c").arg(script).output().expect("it starts"));
     assert_eq!(code, 5, "{stderr}");
-    assert_eq!(records(&out)[0]["status"], "timed_out");
-    let pid = fs::read_to_string(&pid).expect("a number").trim().to_owned();
+    assert_eq!(at.records("out")[0]["status"], "timed_out");
+    let pid = at.text("pid").trim().to_owned();
     let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
     assert!(String::from_utf8_lossy(&line).contains("7777"), "the neighbour still runs");
     assert!(Command::new("kill").arg(&pid).status().expect("kill runs").success());
@@ -233,11 +234,10 @@ fn only_the_tree_of_the_worker_ends_with_it() {
 #[test]
 #[cfg(target_os = "linux")]
 fn a_program_ends_with_the_command_that_is_terminated() {
-    let at = folder();
-    let file = plugins(&at, &[("p-waits", "sleep 6543")]);
-    let line = format!("simplify builtin:box:8 -m p-waits --spheres 20 --json --plugins {file}");
-    let mut command = Command::new(MEDIAL);
-    let mut child = command.args(words(&line)).stdout(Stdio::null()).spawn().expect("it starts");
+    let at = Folder::new();
+    plugins(&at, &[("p-waits", "sleep 6543")]);
+    let line = "simplify builtin:box:8 -m p-waits --spheres 20 --json --plugins plugins.toml";
+    let mut child = at.command(line).stdout(Stdio::null()).spawn().expect("it starts");
     while processes_with("sleep 6543").is_empty() && child.try_wait().expect("state").is_none() {
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
@@ -251,7 +251,7 @@ fn a_program_ends_with_the_command_that_is_terminated() {
 fn bounds_that_were_found_survive_a_method_that_hangs_later() {
     let line =
         "--methods hangs-late --max-error 0.3,0.0000001 --spheres 30 --samples 500 --timeout 10";
-    let records = compare(line, &folder()("out"), 3);
+    let records = compare(line, 3);
     let status = |bound: f64| {
         let of = |r: &&Value| r["simplify"]["level"]["max_error"] == bound;
         let record = records.iter().find(of).expect("a record");

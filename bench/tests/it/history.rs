@@ -1,40 +1,34 @@
 //! `medial history`: runs, change points and exit codes.
 
-use std::fs;
-
-use crate::command::{done, folder, json, refused};
+use crate::command::Folder;
 
 const COMMIT: &str = "0123456789abcdef0123456789abcdef01234567";
 
 #[test]
 fn a_run_is_added_once_and_a_regression_ends_in_code_4() {
-    let at = folder();
-    let (store, history) = (at("store"), at("history"));
-    let compare = ["compare", "builtin:torus:16", "--methods", "qmat,angle", "--spheres", "100"];
-    let more = ["--samples", "500", "--counts-only", "--out", &store];
-    done(&[&compare[..], &more].concat());
+    let at = Folder::new();
+    at.done("compare builtin:torus:16 --methods qmat,angle --spheres 100 --samples 500 --counts-only --out store");
 
-    let add = ["history", &history, "--add", &store, "--date", "2026-11-23", "--commit"];
-    let with = |commit| [&add[..], &[commit]].concat();
-    let (code, object) = json(&with(COMMIT));
+    let add = |commit| format!("history history --add store --date 2026-11-23 --commit {commit}");
+    let (code, object) = at.json(&add(COMMIT));
     let file = object["added"].as_str().unwrap_or_else(|| panic!("{object}")).to_owned();
     assert_eq!((code, &object["regressions"]), (0, &0.into()));
-    assert!(json(&with(COMMIT)).1["added"].is_null(), "a run is added once");
-    refused(&with("HEAD"), 1, "--commit HEAD");
+    assert!(at.json(&add(COMMIT)).1["added"].is_null(), "a run is added once");
+    at.refused(&add("HEAD"), 1, "--commit HEAD");
     // A run needs its commit.
-    refused(&["history", &history, "--add", &store], 2, "--commit");
-    assert!(done(&["history", &history]).starts_with("# First run, nothing to compare"));
+    at.refused("history history --add store", 2, "--commit");
+    assert!(at.done("history history").starts_with("# First run, nothing to compare"));
 
-    let text = fs::read_to_string(&file).expect("a run");
+    let text = at.text(&file);
     let worse = text
         .replace(COMMIT, &COMMIT.replace('0', "f"))
         .replace("2026-11-23", "2026-11-24")
         .replacen("\"evaluate.betti\":[1,1,0]", "\"evaluate.betti\":[1,2,0]", 1);
     assert!(worse.contains("[1,2,0]"), "{worse}");
-    fs::write(at("history/2026-11-24-f1234567.json"), worse).expect("written");
+    at.write("history/2026-11-24-f1234567.json", worse);
     // A damaged file is reported, and the others are read.
-    fs::write(at("history/2026-11-25-00000000.json"), "nothing").expect("written");
-    let (code, object) = json(&["history", &history]);
+    at.write("history/2026-11-25-00000000.json", "nothing");
+    let (code, object) = at.json("history history");
     assert_eq!((code, &object["regressions"]), (4, &1.into()), "{object}");
     assert_eq!(object["changes"][0]["last_before"]["commit"], COMMIT);
     assert!(object["warnings"].to_string().contains("2026-11-25-00000000.json"), "{object}");
@@ -42,7 +36,7 @@ fn a_run_is_added_once_and_a_regression_ends_in_code_4() {
 
 #[test]
 fn an_empty_history_ends_in_code_5() {
-    let at = folder();
-    refused(&["history", &at(".")], 5, "no run");
-    refused(&["history", &at("none")], 1, "none");
+    let at = Folder::new();
+    at.refused("history .", 5, "no run");
+    at.refused("history none", 1, "none");
 }

@@ -1,21 +1,17 @@
 //! The command with hostile files and arguments.
 
 use std::fs;
-#[cfg(unix)]
-use std::path::Path;
 use std::process::{Command, Stdio};
 
-#[cfg(unix)]
 use serde_json::Value;
 
-use crate::command::{MEDIAL, done, folder, json, refused, run};
+use crate::command::{Folder, cubes_off, ended, number};
 
 #[test]
 fn deleted_elements_change_no_byte_of_an_evaluation() {
-    let at = folder();
-    let (plain, flagged) = (at("plain.ma"), at("flagged.ma"));
-    done(&["axis", "builtin:box", "-o", &plain]);
-    let text = fs::read_to_string(&plain).expect("read");
+    let at = Folder::new();
+    at.done("axis builtin:box -o plain.ma");
+    let text = at.text("plain.ma");
     // As MATFP writes it, with a deleted sphere far outside at the end.
     let mut lines = text.lines();
     let counts: Vec<usize> =
@@ -34,9 +30,9 @@ fn deleted_elements_change_no_byte_of_an_evaluation() {
         "{all} {edges} {faces}\n{spheres}v 50 50 50 3 2 1\n{simplices}e 0 {} 0\n",
         counts[0]
     );
-    fs::write(&flagged, text).expect("written");
-    let evaluate = |axis| run(&["evaluate", "builtin:box", axis, "--samples", "500", "--json"]);
-    let (of_plain, of_flagged) = (evaluate(&plain), evaluate(&flagged));
+    at.write("flagged.ma", text);
+    let [of_plain, of_flagged] = ["plain.ma", "flagged.ma"]
+        .map(|axis| at.run(&format!("evaluate builtin:box {axis} --samples 500 --json")));
     assert_eq!((of_plain.0, of_flagged.0), (0, 0));
     assert_eq!(of_plain.1, of_flagged.1);
     assert!(of_flagged.2.contains("1 sphere was dropped: marked as deleted"), "{}", of_flagged.2);
@@ -46,48 +42,41 @@ fn deleted_elements_change_no_byte_of_an_evaluation() {
 #[cfg(target_os = "linux")]
 #[test]
 fn an_output_that_cannot_be_written_is_a_failure() {
-    for arguments in [
-        &["methods"][..],
-        &["methods", "--json"],
-        &["completions", "bash"],
-        &["info", "builtin:sphere:8", "--json"],
-        &["--help"],
-    ] {
+    for line in
+        ["methods", "methods --json", "completions bash", "info builtin:sphere:8 --json", "--help"]
+    {
         let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("a full device");
-        let output = Command::new(MEDIAL).args(arguments).stdout(full).output();
-        let output = output.expect("the command starts");
+        let output = Folder::new().command(line).stdout(full).output().expect("it starts");
         let stderr = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {stderr}");
-        assert!(stderr.starts_with("medial: standard output: "), "{arguments:?}: {stderr}");
+        assert_eq!(output.status.code(), Some(1), "{line}: {stderr}");
+        assert!(stderr.starts_with("medial: standard output: "), "{line}: {stderr}");
     }
 }
 
 #[cfg(unix)]
 #[test]
 fn a_closed_pipe_is_no_failure() {
-    for arguments in [&["methods"][..], &["completions", "bash"]] {
-        let mut command = Command::new(MEDIAL);
-        command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let at = Folder::new();
+    for line in ["methods", "completions bash"] {
+        let mut command = at.command(line);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().expect("the command starts");
         drop(child.stdout.take());
         let output = child.wait_with_output().expect("it ends");
-        assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0), "{arguments:?}");
+        assert_eq!((output.status.code(), output.stderr.len()), (Some(0), 0), "{line}");
     }
 }
 
 #[cfg(unix)]
 #[test]
 fn a_signal_leaves_no_temporary_behind() {
-    let dir = tempfile::tempdir().expect("a folder");
+    let at = Folder::new();
     let names = || {
-        let entries = fs::read_dir(dir.path()).expect("a folder");
+        let entries = fs::read_dir(at.at("")).expect("a folder");
         entries.map(|entry| entry.expect("an entry").file_name()).collect::<Vec<_>>()
     };
-    let mut child = Command::new(MEDIAL)
-        .args(["datasets", "make", "sphere", "--resolution", "1000", "-o"])
-        .arg(dir.path().join("sphere.off"))
-        .spawn()
-        .expect("the command starts");
+    let mut make = at.command("datasets make sphere --resolution 1000 -o sphere.off");
+    let mut child = make.spawn().expect("the command starts");
     while names().is_empty() && child.try_wait().expect("its state").is_none() {
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
@@ -99,57 +88,56 @@ fn a_signal_leaves_no_temporary_behind() {
 
 #[test]
 fn typing_errors_are_refused_with_a_suggestion() {
-    let sphere = "builtin:sphere:8";
-    for (arguments, expected) in [
-        (&["simplify", sphere, "-m", "qmat", "--max-error", "5"][..], "write 0.05 for 5 %"),
-        (&["simplify", sphere, "-m", "qmat", "--max-error", "1"], "write 0.01 for 1 %"),
-        (
-            &["simplify", sphere, "-m", "hem", "--level", "inf", "-o", "x.ma"],
-            "inf is not a distance",
-        ),
-        (&["simplify", sphere, "-m", "qmta"], "did you mean `qmat`?"),
-        (&["simplify", sphere, "--level", "60"], "no method: name one with --method ID"),
-        (&["simplify", sphere], "request --spheres N or --max-error E"),
-        (&["methods", "dey-zhoa"], "did you mean `dey-zhao`?"),
-        (&["info", "builtin:shpere"], "did you mean `sphere`?"),
-        (&["datasets", "make", "shpere", "-o", "x.off"], "did you mean `sphere`?"),
-        (&["info", "builtin:sphere:2000"], "about 4.2e6 vertices"),
-        (&["simplfy", sphere], "'simplify'"),
+    let at = Folder::new();
+    for (line, expected) in [
+        ("simplify builtin:sphere:8 -m qmat --max-error 5", "write 0.05 for 5 %"),
+        ("simplify builtin:sphere:8 -m qmat --max-error 1", "write 0.01 for 1 %"),
+        ("simplify builtin:sphere:8 -m hem --level inf -o x.ma", "inf is not a distance"),
+        ("simplify builtin:sphere:8 -m qmta", "did you mean `qmat`?"),
+        ("simplify builtin:sphere:8 --level 60", "no method: name one with --method ID"),
+        ("simplify builtin:sphere:8", "request --spheres N or --max-error E"),
+        ("methods dey-zhoa", "did you mean `dey-zhao`?"),
+        ("info builtin:shpere", "did you mean `sphere`?"),
+        ("datasets make shpere -o x.off", "did you mean `sphere`?"),
+        ("info builtin:sphere:2000", "about 4.2e6 vertices"),
+        ("simplfy builtin:sphere:8", "'simplify'"),
     ] {
-        refused(arguments, 2, expected);
+        at.refused(line, 2, expected);
     }
 }
 
 #[test]
 fn a_result_without_a_file_is_refused_before_it_is_computed() {
-    let simplify = ["simplify", "builtin:sphere:8", "-m", "qmat", "--spheres", "5"];
-    refused(&simplify, 2, "write the result with -o sphere-8-qmat.ma");
-    assert_eq!(run(&[&simplify[..], &["--json"]].concat()).0, 0);
+    let at = Folder::new();
+    let simplify = "simplify builtin:sphere:8 -m qmat --spheres 5";
+    at.refused(simplify, 2, "write the result with -o sphere-8-qmat.ma");
+    assert_eq!(at.json(simplify).0, 0);
 }
 
 #[test]
 fn lists_of_defaults_are_shown_with_commas() {
     for option in ["-h", "--help"] {
-        assert!(done(&["compare", option]).contains("[default: 200,100,50"));
+        let help = Folder::new().done(&format!("compare {option}"));
+        assert!(help.contains("[default: 200,100,50"));
     }
 }
 
 #[cfg(unix)]
 #[test]
 fn names_reach_neither_a_terminal_nor_a_spreadsheet_as_commands() {
-    let at = folder();
-    let (formula, escape, out) = (at("=cmd|' !A0.off"), at("a\u{1b}[2Jb.off"), at("out"));
-    done(&["datasets", "make", "box", "-o", &formula]);
-    fs::copy(&formula, &escape).expect("copied");
-    let options = ["--methods", "qmat", "--spheres", "20", "--samples", "200", "--out"];
-    let words = [&["compare", &formula, &escape], &options[..], &[&out]].concat();
-    let (code, stdout, stderr) = run(&words);
+    let at = Folder::new();
+    let (formula, escape) = ("=cmd|' !A0.off", "a\u{1b}[2Jb.off");
+    at.done("datasets make box -o box.off");
+    [formula, escape].iter().for_each(|name| at.write(name, at.text("box.off")));
+    let mut compare =
+        at.command("compare --methods qmat --spheres 20 --samples 200 --counts-only --out out");
+    let (code, stdout, stderr) = ended(compare.args([formula, escape]).output().expect("starts"));
     assert_eq!(code, 0, "{stderr}");
-    let table = fs::read_to_string(at("out/results.csv")).expect("a table");
+    let table = at.text("out/results.csv");
     assert!(table.contains("\n'=cmd|' !A0,"), "{table}");
-    let of_info = done(&["info", &escape]);
-    fs::write(&escape, "OFF\n").expect("written");
-    let (_, _, of_error) = run(&["info", &escape]);
+    let of_info = at.done(&format!("info {escape}"));
+    at.write(escape, "OFF\n");
+    let (_, _, of_error) = at.run(&format!("info {escape}"));
     for text in [stdout, stderr, table, of_info, of_error] {
         assert!(!text.contains('\u{1b}'), "{text:?}");
     }
@@ -157,42 +145,40 @@ fn names_reach_neither_a_terminal_nor_a_spreadsheet_as_commands() {
 
 #[test]
 fn the_surface_is_named_where_it_is_at_fault() {
-    let at = folder();
-    let (off, far, axis) = (at("s.off"), at("far.off"), at("axis.ma"));
-    done(&["datasets", "make", "sphere", "-o", &off]);
-    let text = fs::read_to_string(&off).expect("read");
+    let at = Folder::new();
+    at.done("datasets make sphere -o s.off");
+    let text = at.text("s.off");
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     lines[2] = "1e8 0 0".into();
-    fs::write(&far, lines.join("\n")).expect("written");
-    fs::write(&axis, "1 0 0\nv 0 0 0 0.5\n").expect("written");
+    at.write("far.off", lines.join("\n"));
+    at.write("axis.ma", "1 0 0\nv 0 0 0 0.5\n");
     // A mesh that `info` accepts is evaluated, and a refused mesh is named.
-    let accepted = run(&["info", &far]).0;
-    let (code, _, stderr) = run(&["evaluate", &far, &axis, "--samples", "100"]);
+    let accepted = at.run("info far.off").0;
+    let (code, _, stderr) = at.run("evaluate far.off axis.ma --samples 100");
     assert_eq!(code, accepted, "{stderr}");
     assert!(code == 0 || stderr.contains("far.off"), "{stderr}");
 }
 
 #[test]
 fn a_surface_with_a_hole_and_a_second_part_is_repaired() {
-    let at = folder();
-    let (whole, open, repaired) = (at("whole.off"), at("open.off"), at("repaired.off"));
-    done(&["datasets", "make", "pair", "-o", &whole]);
-    let text = fs::read_to_string(&whole).expect("read");
+    let at = Folder::new();
+    at.done("datasets make pair -o whole.off");
+    let text = at.text("whole.off");
     let mut lines: Vec<String> = text.trim_end().lines().map(str::to_owned).collect();
     lines.pop();
     let faces = lines[1].split(' ').nth(1).expect("a count").parse::<usize>().expect("a count");
     lines[1] = lines[1].replace(&format!(" {faces} "), &format!(" {} ", faces - 1));
-    fs::write(&open, lines.join("\n")).expect("written");
-    refused(&["info", &open], 1, "`medial repair --fill-holes`");
-    let repair = |more: &[&str]| json(&[&["repair", &open, "-o", &repaired], more].concat());
-    assert_eq!(repair(&[]).0, 1);
-    assert!(!fs::exists(&repaired).expect("a folder"));
-    let (code, object) = repair(&["--fill-holes"]);
+    at.write("open.off", lines.join("\n"));
+    at.refused("info open.off", 1, "`medial repair --fill-holes`");
+    let repair = |more: &str| at.json(&format!("repair open.off -o repaired.off {more}"));
+    assert_eq!(repair("").0, 1);
+    assert!(!at.has("repaired.off"));
+    let (code, object) = repair("--fill-holes");
     assert_eq!((code, &object["faces"]), (0, &faces.into()), "{object}");
     let filled = serde_json::json!({ "repair": "filled_hole", "edges": 3, "triangles": 1 });
     assert_eq!(object["repairs"][0], filled, "{object}");
-    done(&["info", &repaired]);
-    let (code, object) = repair(&["--fill-holes", "--components", "largest"]);
+    at.done("info repaired.off");
+    let (code, object) = repair("--fill-holes --components largest");
     assert_eq!((code, &object["components"]), (0, &1.into()), "{object}");
 }
 
@@ -205,134 +191,106 @@ const UNFIT: [&str; 3] = [
 
 #[test]
 fn surfaces_and_points_that_bound_no_solid_are_wrapped() {
-    let at = folder();
-    let (unfit, wrapped) = (at("unfit.off"), at("wrapped.off"));
+    let at = Folder::new();
+    let wrap = |more: &str| at.json(&format!("repair unfit.off -o wrapped.off --wrap {more}"));
     for (text, components) in UNFIT.iter().zip([1, 8, 1]) {
-        fs::write(&unfit, text).expect("written");
-        assert_eq!(run(&["info", &unfit]).0, 1, "{text}");
-        let (code, object) = json(&["repair", &unfit, "--wrap", "-o", &wrapped]);
+        at.write("unfit.off", text);
+        assert_eq!(at.run("info unfit.off").0, 1, "{text}");
+        let (code, object) = wrap("");
         assert_eq!((code, &object["components"]), (0, &components.into()), "{object}");
         let repair = object["repairs"].as_array().and_then(|all| all.last()).expect("a repair");
         assert_eq!(repair["repair"], "wrapped", "{object}");
         let [alpha, offset, farthest] =
-            ["alpha", "offset", "farthest"].map(|key| repair[key].as_f64().expect("a length"));
+            ["alpha", "offset", "farthest"].map(|key| number(&repair[key]));
         assert!((alpha / offset - 30.0).abs() < 1e-9 && farthest >= 0.98 * offset, "{object}");
-        let (code, found) = json(&["info", &wrapped]);
+        let (code, found) = at.json("info wrapped.off");
         assert_eq!((code, &found["self_intersecting"]), (0, &false.into()), "{found}");
     }
-    let (code, object) =
-        json(&["repair", &unfit, "--wrap", "0.1", "--components", "largest", "-o", &wrapped]);
+    let (code, object) = wrap("0.1 --components largest");
     let fewer = object["vertices"].as_u64().expect("a count");
     assert_eq!(code, 0, "{object}");
-    let (_, object) = json(&["repair", &unfit, "--wrap", "0.05", "-o", &wrapped]);
+    let (_, object) = wrap("0.05");
     assert!(object["vertices"].as_u64() > Some(2 * fewer), "{object}");
 }
 
 #[test]
 fn a_wrap_without_a_radius_or_with_wrong_input_is_refused() {
-    let at = folder();
-    let (unfit, wrapped) = (at("unfit.off"), at("wrapped.off"));
-    fs::write(&unfit, UNFIT[0]).expect("written");
-    for alpha in ["0", "-0.1", "nan", "inf"] {
-        let words = ["repair", &unfit, "-o", &wrapped, &format!("--wrap={alpha}")];
-        refused(&words, 2, "--wrap must be a positive fraction");
+    let at = Folder::new();
+    let positive = "--wrap must be a positive fraction";
+    for (text, options, code, why) in [
+        (UNFIT[0], "--wrap=0", 2, positive),
+        (UNFIT[0], "--wrap=-0.1", 2, positive),
+        (UNFIT[0], "--wrap=nan", 2, positive),
+        (UNFIT[0], "--wrap=inf", 2, positive),
+        (UNFIT[0], "--wrap --fill-holes", 2, "cannot be used with"),
+        (UNFIT[0], "--wrap=1e-12", 1, "the offset is too small"),
+        (&UNFIT[0].replace("1 1 0", "1 nan 0"), "--wrap", 1, "not finite"),
+        ("OFF\n0 0 0\n", "--wrap", 1, "no face among 0 vertices"),
+        ("OFF\n1 0 0\n1 2 3\n", "--wrap", 1, "the bounding box has the diagonal 0.0"),
+    ] {
+        at.write("unfit.off", text);
+        at.refused(&format!("repair unfit.off -o wrapped.off {options}"), code, why);
+        assert!(!at.has("wrapped.off"));
     }
-    refused(
-        &["repair", &unfit, "-o", &wrapped, "--wrap", "--fill-holes"],
-        2,
-        "cannot be used with",
-    );
-    let words = ["repair", &unfit, "-o", &wrapped, "--wrap"];
-    refused(&[&words[..4], &["--wrap=1e-12"]].concat(), 1, "the offset is too small");
-    fs::write(&unfit, UNFIT[0].replace("1 1 0", "1 nan 0")).expect("written");
-    refused(&words, 1, "not finite");
-    fs::write(&unfit, "OFF\n0 0 0\n").expect("written");
-    refused(&words, 1, "no face among 0 vertices");
-    fs::write(&unfit, "OFF\n1 0 0\n1 2 3\n").expect("written");
-    refused(&words, 1, "the bounding box has the diagonal 0.0");
-    assert!(!fs::exists(&wrapped).expect("a folder"));
 }
 
 /// The artifact of a record may name any file of the machine: a report neither shows nor copies it.
 #[cfg(unix)]
 #[test]
 fn artifacts_that_lead_out_of_a_store_are_not_followed() {
-    let at = folder();
-    let (store, merged, results) = (at("store"), at("merged"), at("store/results.jsonl"));
-    let words = ["compare", "builtin:sphere:8", "--methods", "qmat", "--spheres", "20"];
-    done(&[&words[..], &["--counts-only", "--out", &store]].concat());
-    let text = fs::read_to_string(&results).expect("results");
-    let mut record: Value =
-        serde_json::from_str(text.lines().next().expect("a line")).expect("JSON");
-    let inside = record["artifact"].as_str().expect("a medial mesh").to_owned();
-    fs::copy(at(&format!("store/{inside}")), at("outside.ma")).expect("copied");
-    for artifact in ["../outside.ma", "axes/../../outside.ma", &at("outside.ma"), "study.toml"] {
+    let at = Folder::new();
+    let results = "store/results.jsonl";
+    at.done("compare builtin:sphere:8 --methods qmat --spheres 20 --counts-only --out store");
+    let mut record = at.records("store").remove(0);
+    let inside = record["artifact"].as_str().expect("a medial mesh");
+    let outside = at.at("outside.ma");
+    fs::copy(at.at("store").join(inside), &outside).expect("copied");
+    let absolute = outside.to_str().expect("UTF-8");
+    for artifact in ["../outside.ma", "axes/../../outside.ma", absolute, "study.toml"] {
         record["artifact"] = artifact.into();
-        fs::write(&results, format!("{record}\n")).expect("written");
-        let (code, object) = json(&["report", &store]);
+        at.write(results, format!("{record}\n"));
+        let (code, object) = at.json("report store");
         let warnings = object["warnings"].to_string();
         assert_eq!(code, 0, "{object}");
         assert!(warnings.contains(&format!("{artifact}: not inside the folder")), "{warnings}");
         for folder in ["store/pictures", "store/views"] {
-            let files = fs::read_dir(at(folder)).map_or(0, Iterator::count);
+            let files = fs::read_dir(at.at(folder)).map_or(0, Iterator::count);
             assert_eq!(files, 0, "{artifact}: {folder}");
         }
-        done(&["report", &store, "--out", &merged]);
-        assert!(!Path::new(&merged).join("axes").exists(), "{artifact} was copied");
-        fs::remove_dir_all(&merged).expect("a store");
+        at.done("report store --out merged");
+        assert!(!at.has("merged/axes"), "{artifact} was copied");
+        fs::remove_dir_all(at.at("merged")).expect("a store");
     }
     record["artifact"] = "axes/link.ma".into();
-    fs::write(&results, format!("{record}\n")).expect("written");
-    std::os::unix::fs::symlink(at("outside.ma"), at("store/axes/link.ma")).expect("a link");
-    refused(&["report", &store], 1, "link.ma");
-    refused(&["report", &store, "--site", &at("site")], 1, "link.ma: not a regular file");
-    done(&["report", &store, "--out", &merged]);
-    assert!(!Path::new(&merged).join("axes").exists(), "the link was followed");
-}
-
-/// Two boxes of 2 x 2 x 2 that overlap in a corner, as OFF.
-fn overlapping_boxes() -> String {
-    let mut vertices = String::new();
-    let mut faces = String::new();
-    for (first, low) in [(0, 0.0), (8, 1.0)] {
-        for k in 0..8 {
-            let at = |bit: u32| low + 2.0 * f64::from(k >> bit & 1);
-            vertices += &format!("{} {} {}\n", at(0), at(1), at(2));
-        }
-        let sides =
-            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        for [a, b, c, d] in sides.map(|side| side.map(|v| v + first)) {
-            faces += &format!("3 {a} {b} {c}\n3 {a} {c} {d}\n");
-        }
-    }
-    format!("OFF\n16 24 0\n{vertices}{faces}")
+    at.write(results, format!("{record}\n"));
+    std::os::unix::fs::symlink(outside, at.at("store/axes/link.ma")).expect("a link");
+    at.refused("report store", 1, "link.ma");
+    at.refused("report store --site site", 1, "link.ma: not a regular file");
+    at.done("report store --out merged");
+    assert!(!at.has("merged/axes"), "the link was followed");
 }
 
 #[test]
 fn bodies_that_overlap_are_one_solid_in_every_verb_or_refused_as_they_are() {
-    let at = folder();
-    let (mesh, solid, axis, out) = (at("two.off"), at("one.off"), at("one.ma"), at("out"));
-    fs::write(&mesh, overlapping_boxes()).expect("written");
+    let at = Folder::new();
+    at.write("two.off", cubes_off(&[([0.0; 3], 2.0), ([1.0; 3], 2.0)]));
     let is_named = |object: &Value| {
         let warnings = object["warnings"].as_array().expect("a list");
         warnings.iter().any(|warning| warning.as_str().is_some_and(|text| text.contains("overlap")))
     };
-    for words in [
-        &["axis", &mesh, "-o", &axis][..],
-        &["simplify", &mesh, "--method", "qmat", "--spheres", "40", "-o", &axis],
-        &["evaluate", &mesh, &axis, "--samples", "500"],
-    ] {
-        let (code, object) = json(words);
+    let (axis, simplify) =
+        ("axis two.off -o one.ma", "simplify two.off --method qmat --spheres 40 -o one.ma");
+    for line in [axis, simplify, "evaluate two.off one.ma --samples 500"] {
+        let (code, object) = at.json(line);
         assert!(code == 0 && is_named(&object), "{object}");
     }
-    done(&["repair", &mesh, "-o", &solid]);
-    let (_, info) = json(&["info", &solid]);
+    at.done("repair two.off -o one.off");
+    let (_, info) = at.json("info one.off");
     assert_eq!((&info["components"], &info["self_intersecting"]), (&1.into(), &false.into()));
     // 8 + 8 - 1.
-    assert!((info["volume"].as_f64().expect("closed") - 15.0).abs() < 1e-9, "{info}");
-    let as_is = |words: &[&str]| refused(&[words, &["--as-is"]].concat(), 1, "faces cross");
-    as_is(&["axis", &mesh, "-o", &axis]);
-    as_is(&["simplify", &mesh, "--method", "qmat", "--spheres", "40", "-o", &axis]);
-    as_is(&["compare", &mesh, "--methods", "qmat", "--spheres", "40", "--out", &out]);
-    done(&["axis", &solid, "-o", &axis, "--as-is"]);
+    assert!((number(&info["volume"]) - 15.0).abs() < 1e-9, "{info}");
+    for line in [axis, simplify, "compare two.off --methods qmat --spheres 40 --out out"] {
+        at.refused(&format!("{line} --as-is"), 1, "faces cross");
+    }
+    at.done("axis one.off -o one.ma --as-is");
 }

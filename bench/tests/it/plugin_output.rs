@@ -3,23 +3,18 @@
 
 use std::fs;
 
-use crate::command::{done, folder, records, refused};
+use crate::command::Folder;
 
 /// Compares methods on a box. Each must have results, a line in the CSV, a curve in a plot, and its title on the page.
-fn compares(plugins: &[&str], methods: &[(&str, &str)]) {
-    let at = folder();
-    let out = at("out");
-    let ids = methods.iter().map(|(id, _)| *id).collect::<Vec<_>>().join(",") + ",qmat";
-    let arguments = [
-        &["compare", "builtin:box:8", "--methods", &ids, "--spheres", "30,20"][..],
-        &["--samples", "200", "--counts-only", "--quiet", "--out", &out],
-        plugins,
-    ];
-    done(&arguments.concat());
-    let records = records(&out);
+fn compares(plugins: &str, methods: &[(&str, &str)]) {
+    let at = Folder::new();
+    let ids = methods.iter().map(|(id, _)| *id).collect::<Vec<_>>().join(",");
+    let options = "--spheres 30,20 --samples 200 --counts-only --quiet --out out";
+    at.done(&format!("compare builtin:box:8 --methods {ids},qmat {options} --plugins {plugins}"));
+    let records = at.records("out");
     let [page, csv, table] = ["index.html", "results.csv", "tables/summary.md"]
-        .map(|name| fs::read_to_string(at("out") + "/" + name).expect("a file of the report"));
-    let plots = fs::read_dir(at("out/plots")).expect("plots").flatten();
+        .map(|name| at.text(format!("out/{name}")));
+    let plots = fs::read_dir(at.at("out/plots")).expect("plots").flatten();
     let plots: Vec<String> =
         plots.map(|entry| fs::read_to_string(entry.path()).expect("a plot")).collect();
     for (id, title) in methods {
@@ -30,7 +25,7 @@ fn compares(plugins: &[&str], methods: &[(&str, &str)]) {
         assert!(table.contains(id), "{id} is not in the table");
         assert!(plots.iter().any(|plot| plot.contains(id)), "{id} is in no plot");
     }
-    let listed = done(&[&["methods"][..], plugins].concat());
+    let listed = at.done(&format!("methods --plugins {plugins}"));
     assert!(methods.iter().all(|(id, title)| listed.contains(id) && listed.contains(title)));
 }
 
@@ -42,17 +37,17 @@ fn programs() {
     if medial_test_support::has_numpy() {
         methods.push(("largest", "Largest balls first (Python)"));
     }
-    compares(&["--plugins", file], &methods);
+    compares(file, &methods);
 }
 
 #[test]
 fn an_id_that_is_taken_is_refused() {
-    let at = folder();
+    let at = Folder::new();
     let text = "[[method]]\nid = \"ID\"\ntitle = \"Mine\"\nlevels = [\"spheres\"]\n\
                 command = [\"sh\", \"{output}\", \"{spheres}\"]\n";
     for id in ["qmat", "initial", "given"] {
-        fs::write(at("mine.toml"), text.replace("ID", id)).expect("written");
+        at.write("mine.toml", text.replace("ID", id));
         let why = format!("mine.toml, line 2: the id `{id}` is taken; choose another");
-        refused(&["methods", "--plugins", &at("mine.toml")], 2, &why);
+        at.refused("methods --plugins mine.toml", 2, &why);
     }
 }

@@ -2,20 +2,15 @@
 #![cfg(unix)]
 
 use std::fs;
-use std::path::PathBuf;
-use std::process::Command;
 
 use medial::surface;
 use medial_run::hash::hex_digest;
 use serde_json::{Value, json};
-use tempfile::TempDir;
 
-use crate::command::{MEDIAL, ended, records};
+use crate::command::{Folder, ended, json_of};
 
-/// A user's machine: a cache and a catalogue.
-struct Machine {
-    dir: TempDir,
-}
+/// A user's machine: a folder with a cache and a catalogue.
+struct Machine(Folder);
 
 /// The meshes of the catalogue: name, set, package, shape and resolution.
 const MESHES: [(&str, &str, &str, &str, u32); 3] = [
@@ -26,17 +21,16 @@ const MESHES: [(&str, &str, &str, &str, u32); 3] = [
 
 fn content(name: &str) -> Vec<u8> {
     let (.., shape, resolution) = MESHES.iter().find(|mesh| mesh.0 == name).expect("a mesh");
-    let dir = tempfile::tempdir().expect("a folder");
-    let path = dir.path().join("mesh.off");
+    let at = Folder::new();
     let mesh = medial_datasets::find(shape).expect("a shape").mesh(*resolution);
-    surface::write(&path, &mesh).expect("written");
-    fs::read(path).expect("read")
+    surface::write(at.at("mesh.off"), &mesh).expect("written");
+    fs::read(at.at("mesh.off")).expect("read")
 }
 
 impl Machine {
     fn new() -> Self {
-        let machine = Self { dir: tempfile::tempdir().expect("a folder") };
-        fs::create_dir_all(machine.at("cache/meshes")).expect("made");
+        let at = Folder::new();
+        fs::create_dir_all(at.at("cache/meshes")).expect("made");
         let mut text = "package = [{ id = 'deb:balls', licence = 'none', version = '1.0' }, \
                         { id = 'file:paper', licence = 'none' }]\nmesh = [\n"
             .to_owned();
@@ -46,33 +40,26 @@ impl Machine {
                 "  {{ name = '{name}', set = '{set}', package = '{package}', path = '{name}.off', sha256 = '{hash}' }},\n",
             );
         }
-        fs::write(machine.at("catalogue.toml"), text + "]\n").expect("written");
-        machine
+        at.write("catalogue.toml", text + "]\n");
+        Self(at)
     }
 
-    fn at(&self, name: &str) -> PathBuf {
-        self.dir.path().join(name)
-    }
-
-    fn run(&self, arguments: &[&str]) -> (i32, String, String) {
-        let mut command = Command::new(MEDIAL);
-        command.args(arguments).env("MEDIAL_CACHE", self.at("cache"));
-        command.env("MEDIAL_CATALOGUE", self.at("catalogue.toml")).current_dir(self.dir.path());
+    fn run(&self, line: &str) -> (i32, String, String) {
+        let mut command = self.0.command(line);
+        command.env("MEDIAL_CACHE", self.0.at("cache"));
+        command.env("MEDIAL_CATALOGUE", self.0.at("catalogue.toml"));
         ended(command.output().expect("the command starts"))
     }
 
-    fn json(&self, arguments: &[&str]) -> (i32, Value) {
-        let (code, stdout, stderr) = self.run(&[arguments, &["--json"]].concat());
-        let object = serde_json::from_str(&stdout);
-        (code, object.unwrap_or_else(|error| panic!("{error}: {stdout}{stderr}")))
+    fn json(&self, line: &str) -> (i32, Value) {
+        json_of(self.run(&format!("{line} --json")))
     }
 
-    /// The records of a comparison of a set.
-    fn compared(&self, more: &[&str]) -> Result<Vec<Value>, (i32, String)> {
-        let compare = ["compare", "--methods", "qmat", "--spheres", "10", "--counts-only"];
-        let words = [&compare[..], &["--quiet", "--samples", "200"], more].concat();
-        match self.run(&words) {
-            (0, ..) => Ok(records(self.at("medial-report"))),
+    /// The records of a comparison of sets.
+    fn compared(&self, sets: &str) -> Result<Vec<Value>, (i32, String)> {
+        let line = "compare --methods qmat --spheres 10 --counts-only --quiet --samples 200";
+        match self.run(&format!("{line} {sets}")) {
+            (0, ..) => Ok(self.0.records("medial-report")),
             (code, _, stderr) => Err((code, stderr)),
         }
     }
@@ -81,13 +68,12 @@ impl Machine {
 #[test]
 fn sets_are_compared_under_their_names() {
     let machine = Machine::new();
-    let (code, stderr) = machine.compared(&["--dataset", "public"]).expect_err("not fetched");
+    let (code, stderr) = machine.compared("--dataset public").expect_err("not fetched");
     assert!(code == 2 && stderr.contains("`medial datasets fetch public`"), "{stderr}");
     for name in ["ball", "rod-thin"] {
-        let path = machine.at("cache/meshes").join(name).with_extension("off");
-        fs::write(path, content(name)).expect("written");
+        machine.0.write(format!("cache/meshes/{name}.off"), content(name));
     }
-    let records = machine.compared(&["--dataset", "public", "--dataset", "sphere"]);
+    let records = machine.compared("--dataset public --dataset sphere");
     let records = records.expect("three results");
     let found: Vec<_> =
         records.iter().map(|r| [r["mesh"].as_str(), r["dataset"].as_str()]).collect();
@@ -98,26 +84,26 @@ fn sets_are_compared_under_their_names() {
 #[test]
 fn a_users_copy_is_recognised_by_its_content() {
     let machine = Machine::new();
-    let (code, _, stderr) = machine.run(&["info", "dataset:cap"]);
+    let (code, _, stderr) = machine.run("info dataset:cap");
     assert!(code == 2 && stderr.contains("fetch --from FILE"), "{stderr}");
-    let (code, object) = machine.json(&["datasets", "fetch", "cap"]);
+    let (code, object) = machine.json("datasets fetch cap");
     assert_eq!((code, &object["missing"]), (3, &json!(["cap"])), "{object}");
-    fs::write(machine.at("Some Name.off"), content("cap")).expect("written");
-    let (code, object) = machine.json(&["datasets", "fetch", "cap", "--from", "Some Name.off"]);
+    machine.0.write("Some-Name.off", content("cap"));
+    let (code, object) = machine.json("datasets fetch cap --from Some-Name.off");
     assert_eq!((code, &object["fetched"]), (0, &json!(["cap"])), "{object}");
-    assert_eq!(machine.run(&["info", "dataset:cap"]).0, 0);
-    let records = machine.compared(&["--dataset", "papers"]).expect("a result");
+    assert_eq!(machine.run("info dataset:cap").0, 0);
+    let records = machine.compared("--dataset papers").expect("a result");
     assert_eq!((&records[0]["mesh"], &records[0]["dataset"]), (&"cap".into(), &"papers".into()));
-    let (code, _, stderr) = machine.run(&["datasets", "fetch", "bal"]);
+    let (code, _, stderr) = machine.run("datasets fetch bal");
     assert!(code == 2 && stderr.contains("did you mean `ball`?"), "{stderr}");
 }
 
 #[test]
 fn the_list_has_the_state_of_each_mesh() {
     let machine = Machine::new();
-    fs::write(machine.at("cache/meshes/ball.off"), "OFF\n").expect("written");
-    fs::write(machine.at("cache/meshes/rod-thin.off"), content("rod-thin")).expect("written");
-    let (_, object) = machine.json(&["datasets", "list"]);
+    machine.0.write("cache/meshes/ball.off", "OFF\n");
+    machine.0.write("cache/meshes/rod-thin.off", content("rod-thin"));
+    let (_, object) = machine.json("datasets list");
     assert_eq!(object["published"][0]["state"], "another file");
     assert_eq!(object["published"][1]["state"], "here");
     assert!(object["datasets"].as_array().is_some_and(|shapes| shapes.len() > 10));

@@ -1,9 +1,8 @@
 //! Files for ParaView and Blender, through VTK and trimesh: `scripts/readers.sh`, if its environment exists.
 
-use std::path::Path;
 use std::process::Command;
 
-use crate::command::{MEDIAL, done, folder, json, refused};
+use crate::command::{Folder, MEDIAL};
 
 /// The Python that `scripts/readers.sh` sets up, or that of `$READERS_PYTHON`.
 fn python() -> Option<String> {
@@ -19,11 +18,11 @@ fn vtk_and_trimesh_agree() {
         medial_test_support::skip("no Python with vtk and trimesh (scripts/readers.sh makes one)");
         return;
     };
-    let at = folder();
+    let at = Folder::new();
     let output = Command::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../scripts/readers.sh"))
         .env("READERS_PYTHON", python)
         .env("MEDIAL", MEDIAL)
-        .env("CARGO_TARGET_DIR", at("target"))
+        .env("CARGO_TARGET_DIR", at.at("target"))
         .output()
         .expect("the script starts");
     let text = String::from_utf8_lossy(&output.stdout);
@@ -34,28 +33,27 @@ fn vtk_and_trimesh_agree() {
 /// The test above compares the content through VTK and trimesh. This one writes every option, and reads neither format.
 #[test]
 fn viewer_formats_are_written_and_never_read() {
-    let at = folder();
-    let ma = at("x.ma");
-    done(&["axis", "builtin:box:8", "-o", &ma]);
+    let at = Folder::new();
+    at.done("axis builtin:box:8 -o x.ma");
     for (to, options) in [
-        ("a.vtp", &["--color", "stability"][..]),
-        ("b.vtp", &["--color", "error", "--mesh", "builtin:box:8"]),
-        ("c.glb", &["--colour", "error", "--mesh", "builtin:box:8", "--spheres"]),
-        ("d.glb", &[]),
+        ("a.vtp", "--color stability"),
+        ("b.vtp", "--color error --mesh builtin:box:8"),
+        ("c.glb", "--colour error --mesh builtin:box:8 --spheres"),
+        ("d.glb", ""),
     ] {
-        done(&[&["convert", &ma, &at(to)], options].concat());
-        refused(&["convert", &at(to), &at("back.ma")], 2, to);
-        assert!(!Path::new(&at("back.ma")).exists());
+        at.done(&format!("convert x.ma {to} {options}"));
+        at.refused(&format!("convert {to} back.ma"), 2, to);
+        assert!(!at.has("back.ma"));
     }
-    let (_, object) = json(&["convert", &ma, &at("e.glb")]);
-    let warning = "rounded coordinates and radii to single precision, by at most";
-    assert!(object["warnings"].to_string().contains(warning), "{object}");
     // The same note of each verb that writes the format.
-    for (to, warning) in [("f.glb", warning), ("f.obj", "left out the radii")] {
-        let file = at(to);
-        let simplify = ["simplify", "builtin:box:8", "-m", "qmat", "--spheres", "8", "-o", &file];
-        for words in [&simplify[..], &["axis", "builtin:box:8", "-o", &file]] {
-            let (_, object) = json(words);
+    let rounded = "rounded coordinates and radii to single precision, by at most";
+    for (to, warning) in [("e.glb", rounded), ("f.obj", "left out the radii")] {
+        for verb in [
+            "convert x.ma",
+            "axis builtin:box:8 -o",
+            "simplify builtin:box:8 -m qmat --spheres 8 -o",
+        ] {
+            let (_, object) = at.json(&format!("{verb} {to}"));
             assert!(object["warnings"].to_string().contains(warning), "{object}");
         }
     }
@@ -63,53 +61,46 @@ fn viewer_formats_are_written_and_never_read() {
 
 #[test]
 fn spheres_of_a_link_are_written_read_and_measured() {
-    let at = folder();
-    let (yaml, two) = (at("link.yaml"), at("two.json"));
-    let simplify = ["simplify", "builtin:box:8", "-m", "qmat", "--spheres", "8", "-o", &yaml];
-    let (_, object) = json(&simplify);
+    let at = Folder::new();
+    let (_, object) = at.json("simplify builtin:box:8 -m qmat --spheres 8 -o link.yaml");
     assert!(object["warnings"].to_string().contains(".yaml holds spheres alone"), "{object}");
-    done(&["convert", &yaml, &at("link.urdf")]);
-    let (code, object) = json(&["evaluate", "builtin:box:8", &at("link.urdf")]);
+    at.done("convert link.yaml link.urdf");
+    let (code, object) = at.json("evaluate builtin:box:8 link.urdf");
     assert_eq!((code, object.to_string().contains("uncovered")), (0, true), "{object}");
-    done(&["render", "builtin:box:8", &yaml, "-o", &at("link.png")]);
+    at.done("render builtin:box:8 link.yaml -o link.png");
     let list = r#"[{"center": [0, 0, 0], "radius": 1}]"#;
-    std::fs::write(&two, format!("{{\"arm\": {list}, \"hand\": {list}}}")).expect("written");
-    refused(
-        &["convert", &two, &at("x.csv")],
-        1,
-        "2 links (1 arm, 2 hand); select one by --block K",
-    );
-    done(&["convert", &two, &at("x.csv"), "--block", "2"]);
-    refused(&["convert", "builtin:box:8", &at("x.csv")], 2, "--method cover --spheres 32 -o ");
+    at.write("two.json", format!("{{\"arm\": {list}, \"hand\": {list}}}"));
+    let why = "2 links (1 arm, 2 hand); select one by --block K";
+    at.refused("convert two.json x.csv", 1, why);
+    at.done("convert two.json x.csv --block 2");
+    at.refused("convert builtin:box:8 x.csv", 2, "--method cover --spheres 32 -o ");
 }
 
 #[test]
 fn an_output_that_the_command_reads_is_refused() {
-    let at = folder();
-    let [surface, axis] = ["s.obj", "a.ma"].map(&at);
-    done(&["datasets", "make", "box", "-o", &surface]);
-    let before = std::fs::read(&surface).expect("written");
-    let other = "reads or writes this file already";
-    refused(&["simplify", &surface, "-m", "qmat", "--spheres", "8", "-o", &surface], 2, other);
-    let crust = ["reconstruct", "--method", "power-crust", "--mesh", &surface, "-o", &surface];
-    refused(&crust, 2, other);
-    refused(&["repair", &surface, "-o", &surface], 2, other);
-    done(&["simplify", &surface, "-m", "qmat", "--spheres", "8", "-o", &axis]);
-    let again =
-        ["simplify", &surface, "-m", "qmat", "--spheres", "6", "--initial", &axis, "-o", &axis];
-    refused(&again, 2, other);
-    refused(&["convert", &axis, &axis], 2, other);
-    assert_eq!(std::fs::read(&surface).expect("still there"), before);
+    let at = Folder::new();
+    at.done("datasets make box -o s.obj");
+    let before = at.text("s.obj");
+    at.done("simplify s.obj -m qmat --spheres 8 -o a.ma");
+    for line in [
+        "simplify s.obj -m qmat --spheres 8 -o s.obj",
+        "reconstruct --method power-crust --mesh s.obj -o s.obj",
+        "repair s.obj -o s.obj",
+        "simplify s.obj -m qmat --spheres 6 --initial a.ma -o a.ma",
+        "convert a.ma a.ma",
+    ] {
+        at.refused(line, 2, "reads or writes this file already");
+    }
+    assert_eq!(at.text("s.obj"), before);
 }
 
 /// A sphere of radius 0.6 in the middle of the box, whose faces are 0.5 away, and one of 0.4.
 #[test]
 fn errors_are_radii_less_depths() {
-    let at = folder();
-    std::fs::write(at("x.ma"), "2 0 0\nv 0 0 0 0.6\nv 0.5 0 0 0.4\n").expect("written");
-    let error = ["--color", "error", "--mesh", "builtin:box"];
-    done(&[&["convert", &at("x.ma"), &at("x.glb")], &error[..]].concat());
-    let bytes = std::fs::read(at("x.glb")).expect("a file");
+    let at = Folder::new();
+    at.write("x.ma", "2 0 0\nv 0 0 0 0.6\nv 0.5 0 0 0.4\n");
+    at.done("convert x.ma x.glb --color error --mesh builtin:box");
+    let bytes = std::fs::read(at.at("x.glb")).expect("a file");
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("4 bytes"));
     let length = word(12) as usize;
     let scene: serde_json::Value = serde_json::from_slice(&bytes[20..20 + length]).expect("JSON");
@@ -125,22 +116,20 @@ fn errors_are_radii_less_depths() {
 
 #[test]
 fn unsupported_options_are_refused_before_a_file_is_written() {
-    let at = folder();
-    let ma = at("x.ma");
-    done(&["axis", "builtin:box:8", "-o", &ma]);
-    for (to, options, expected) in [
-        ("x.ply", &["--color", "error"][..], "--color: "),
-        ("x.vtp", &["--spheres"], "--spheres: "),
-        ("x.glb", &["--color", "error"], "no surface; give --mesh MESH"),
-        ("x.glb", &["--mesh", "builtin:box"], "--mesh requires --color error"),
+    let at = Folder::new();
+    at.done("axis builtin:box:8 -o x.ma");
+    at.done("datasets make sphere --resolution 8 -o s.off");
+    for (words, expected) in [
+        ("x.ma x.ply --color error", "--color: "),
+        ("x.ma x.vtp --spheres", "--spheres: "),
+        ("x.ma x.glb --color error", "no surface; give --mesh MESH"),
+        ("x.ma x.glb --mesh builtin:box", "--mesh requires --color error"),
+        ("s.off x.glb", ""),
+        ("s.off x.vtp", ""),
+        ("s.off x.off --spheres", ""),
     ] {
-        refused(&[&["convert", &ma, &at(to)], options].concat(), 2, expected);
-        assert!(!Path::new(&at(to)).exists());
-    }
-    let surface = at("s.off");
-    done(&["datasets", "make", "sphere", "--resolution", "8", "-o", &surface]);
-    for (to, options) in [("y.glb", &[][..]), ("y.vtp", &[]), ("y.off", &["--spheres"])] {
-        refused(&[&["convert", &surface, &at(to)], options].concat(), 2, "");
+        at.refused(&format!("convert {words}"), 2, expected);
+        assert!(["x.ply", "x.vtp", "x.glb", "x.off"].iter().all(|name| !at.has(name)), "{words}");
     }
 }
 
@@ -148,20 +137,22 @@ fn unsupported_options_are_refused_before_a_file_is_written() {
 #[cfg(unix)]
 #[test]
 fn inputs_that_are_no_files_are_refused() {
-    let at = folder();
+    let at = Folder::new();
     for extension in ["ma", "ply", "obj", "off", "csv", "json", "yaml", "urdf", "txt"] {
-        let [pipe, device] = ["pipe", "zero"].map(|name| at(&format!("{name}.{extension}")));
-        assert!(Command::new("mkfifo").arg(&pipe).status().expect("runs").success());
-        std::os::unix::fs::symlink("/dev/zero", &device).expect("a link");
-        for path in [&pipe, &device] {
-            let why = "not a regular file";
-            refused(&["convert", path, &at("x.ma")], 1, why);
-            refused(&["convert", path, &at("x.ply")], 1, why);
-            refused(&["evaluate", "builtin:box:8", path], 1, why);
+        let [pipe, device] = ["pipe", "zero"].map(|name| format!("{name}.{extension}"));
+        assert!(Command::new("mkfifo").arg(at.at(&pipe)).status().expect("runs").success());
+        std::os::unix::fs::symlink("/dev/zero", at.at(&device)).expect("a link");
+        for file in [&pipe, &device] {
+            let mut lines = vec![
+                format!("convert {file} x.ma"),
+                format!("convert {file} x.ply"),
+                format!("evaluate builtin:box:8 {file}"),
+            ];
             if extension != "off" {
-                refused(&["view", path, "-o", &at("x.html")], 1, why);
-                refused(&["reconstruct", path, "-o", &at("x.off")], 1, why);
+                lines.push(format!("view {file} -o x.html"));
+                lines.push(format!("reconstruct {file} -o x.off"));
             }
+            lines.iter().for_each(|line| at.refused(line, 1, "not a regular file"));
         }
     }
 }
