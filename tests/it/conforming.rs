@@ -1,7 +1,5 @@
 //! Starts whose topology is right by construction, on surfaces whose vertices alone give a wrong one.
 
-use std::collections::BTreeSet;
-
 use medial::Vec3;
 use medial::complex::{MedialMesh, betti};
 use medial::shape::{Shape, ShapeOptions};
@@ -101,9 +99,11 @@ fn scaled(mesh: TriMesh, factors: Vec3) -> TriMesh {
     shapes::moved(mesh, |p| p * factors)
 }
 
-fn turned(mesh: TriMesh) -> TriMesh {
-    let axis = Vec3::new(1.0, 2.0, 3.0).normalize();
-    shapes::moved(mesh, |p| glam::DQuat::from_axis_angle(axis, 1.0) * p)
+/// Some direction.
+const AXIS: Vec3 = Vec3::new(1.0, 2.0, 3.0);
+
+fn turned(mesh: TriMesh, axis: Vec3) -> TriMesh {
+    shapes::moved(mesh, |p| glam::DQuat::from_axis_angle(axis.normalize(), 1.0) * p)
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn coarse_thin_and_sharp_solids_have_their_topology() {
         ("wedge of 5 degrees", wedge(5.0)),
         ("wedge of 1 degree", wedge(1.0)),
         ("nested spheres", hollow(&ball(4), &scaled(ball(3), Vec3::splat(0.9)))),
-        ("a thin shell", hollow(&ball(4), &turned(scaled(ball(4), Vec3::splat(0.99))))),
+        ("a thin shell", hollow(&ball(4), &turned(scaled(ball(4), Vec3::splat(0.99)), AXIS))),
         (
             "a coarse sphere in a box",
             hollow(&box_of([1.0; 3]), &scaled(ball(1), Vec3::splat(0.99))),
@@ -196,44 +196,15 @@ fn random_boxes(rng: &mut Pcg64) -> TriMesh {
         }
         planes
     });
-    let mut faces = Vec::new();
-    for cell in within() {
-        let solid = |c: [usize; 3]| is_solid[c[0]][c[1]][c[2]];
-        for axis in (0..3).filter(|_| solid(cell)) {
-            for (side, out) in [(0, -1_isize), (1, 1)] {
-                let mut other = cell;
-                other[axis] = other[axis].checked_add_signed(out).unwrap();
-                if solid(other) {
-                    continue;
-                }
-                // Corners around the side, counter-clockwise from outside.
-                let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-                let mut ring = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[du, dv]| {
-                    let mut corner = cell.map(|c| c - 1);
-                    corner[axis] += side;
-                    corner[u] += du;
-                    corner[v] += dv;
-                    ((corner[0] * (N + 1) + corner[1]) * (N + 1) + corner[2]) as u32
-                });
-                if side == 0 {
-                    ring.reverse();
-                }
-                ring.rotate_left(rng.random_range(0..4));
-                let [a, b, c, d] = ring;
-                faces.extend([[a, b, c], [a, c, d]]);
-            }
+    let mut mesh = shapes::cells(&planes, |[x, y, z]| is_solid[x + 1][y + 1][z + 1]);
+    // Either diagonal of a square.
+    for pair in mesh.faces.chunks_exact_mut(2) {
+        if rng.random_range(0..4) % 2 == 1 {
+            let ([a, b, c], [.., d]) = (pair[0], pair[1]);
+            pair.copy_from_slice(&[[b, c, d], [b, d, a]]);
         }
     }
-    let used: BTreeSet<u32> = faces.iter().flatten().copied().collect();
-    let used: Vec<u32> = used.into_iter().collect();
-    let vertices = used.iter().map(|&v| {
-        let v = v as usize;
-        let at = [v / (N + 1) / (N + 1), v / (N + 1) % (N + 1), v % (N + 1)];
-        Vec3::from(std::array::from_fn(|axis| planes[axis][at[axis]]))
-    });
-    let vertices = vertices.collect();
-    let renumbered = |v: u32| used.binary_search(&v).unwrap() as u32;
-    TriMesh { vertices, faces: faces.into_iter().map(|face| face.map(renumbered)).collect() }
+    mesh
 }
 
 #[test]
@@ -248,8 +219,7 @@ fn random_solids_of_boxes_have_their_topology() {
         // Turned, their sides are flat only up to rounding; sheared, their edges are no Delaunay edges.
         let mut number = || rng.random_range(-1.0..1.0);
         if k % 3 == 1 {
-            let axis = Vec3::new(number(), number(), number()).normalize();
-            mesh = shapes::moved(mesh, |p| glam::DQuat::from_axis_angle(axis, 1.0) * p);
+            mesh = turned(mesh, Vec3::new(number(), number(), number()));
         } else if k % 3 == 2 {
             let [x, y, z] = [number(), number(), number()];
             mesh = shapes::moved(mesh, |p| Vec3::new(p.x + x * p.y + y * p.z, p.y + z * p.z, p.z));
@@ -278,7 +248,7 @@ fn threads_order_scale_and_rotation_keep_the_topology() {
     renumbered.faces.iter_mut().for_each(|face| *face = face.map(|v| last - v));
     renumbered.faces.reverse();
     // Rounding and the order of the vertices decide ties: other points may be added, and the topology is right.
-    for other in [scaled(mesh.clone(), Vec3::splat(1.0 / 3.0)), renumbered, turned(mesh)] {
+    for other in [scaled(mesh.clone(), Vec3::splat(1.0 / 3.0)), renumbered, turned(mesh, AXIS)] {
         let (count, _) = start(&other, 2);
         assert!((count as f64 / added as f64 - 1.0).abs() < 0.3, "{count} for {added}");
     }

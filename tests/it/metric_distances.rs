@@ -377,8 +377,7 @@ fn buried_parts_do_not_count() {
     assert!((alone.lower - both.lower).abs() <= 1e-4 && (alone.upper - both.upper).abs() <= 1e-4);
 }
 
-/// The block `[0, 3] x [0, 2] x [0, 1]` without the box between two corners, which may reach its sides: cells of a grid,
-/// and the squares between full and empty ones.
+/// The block `[0, 3] x [0, 2] x [0, 1]` without the box between two corners, which may reach its sides.
 fn block_without(lo: Vec3, hi: Vec3) -> TriMesh {
     let size = [3.0, 2.0, 1.0];
     let cuts: [Vec<f64>; 3] = std::array::from_fn(|k| {
@@ -386,40 +385,8 @@ fn block_without(lo: Vec3, hi: Vec3) -> TriMesh {
         cuts.dedup();
         cuts
     });
-    let is_full = |cell: [i32; 3]| {
-        let at = |k: usize| usize::try_from(cell[k]).ok().filter(|&c| c + 1 < cuts[k].len());
-        let Some(cell) = at(0).and_then(|x| Some([x, at(1)?, at(2)?])) else { return false };
-        !(0..3).all(|k| (lo[k]..hi[k]).contains(&cuts[k][cell[k]]))
-    };
-    let (mut ids, mut mesh) = (std::collections::HashMap::new(), TriMesh::default());
-    let cells = |k: usize| 0..cuts[k].len() as i32 - 1;
-    for cell in cells(0).flat_map(|x| cells(1).flat_map(move |y| cells(2).map(move |z| [x, y, z])))
-    {
-        for (axis, side) in (0..3).flat_map(|axis| [(axis, 0), (axis, 1)]) {
-            let mut other = cell;
-            other[axis] += 2 * side - 1;
-            if !is_full(cell) || is_full(other) {
-                continue;
-            }
-            let mut square = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[a, b]| {
-                let mut corner = cell;
-                corner[axis] += side;
-                corner[(axis + 1) % 3] += a;
-                corner[(axis + 2) % 3] += b;
-                *ids.entry(corner).or_insert_with(|| {
-                    mesh.vertices
-                        .push(Vec3::from_array([0, 1, 2].map(|k| cuts[k][corner[k] as usize])));
-                    mesh.vertices.len() as u32 - 1
-                })
-            });
-            if side == 0 {
-                square.reverse();
-            }
-            let [a, b, c, d] = square;
-            mesh.faces.extend([[a, b, c], [a, c, d]]);
-        }
-    }
-    mesh
+    let is_hole = |cell: [usize; 3]| (0..3).all(|k| (lo[k]..hi[k]).contains(&cuts[k][cell[k]]));
+    crate::shapes::cells(&cuts, |cell| !is_hole(cell))
 }
 
 /// A surface and a medial mesh, divided by a length.

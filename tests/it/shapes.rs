@@ -56,30 +56,46 @@ pub fn sphere(level: usize) -> TriMesh {
     TriMesh { vertices, faces }
 }
 
-/// The unit cube with `n` by `n` squares of two triangles on each side.
-pub fn lattice_cube(n: u32) -> TriMesh {
-    let mut mesh = TriMesh::default();
-    let mut known = HashMap::new();
-    for axis in 0..3 {
-        for side in [0, n] {
-            for (i, j) in (0..n * n).map(|k| (k % n, k / n)) {
-                let mut quad = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(u, v)| {
-                    let mut p = [0; 3];
-                    (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (side, i + u, j + v);
-                    *known.entry(p).or_insert_with(|| {
-                        mesh.vertices.push(Vec3::from(p.map(f64::from)) / f64::from(n));
-                        mesh.vertices.len() as u32 - 1
-                    })
-                });
-                if side == 0 {
-                    quad.reverse();
-                }
-                let [a, b, c, d] = quad;
-                mesh.faces.extend([[a, b, c], [a, c, d]]);
+/// The boundary of the solid cells of a grid between planes: a square of two triangles, outward, between each of them
+/// and what is not solid, in the order of the cells.
+pub fn cells(planes: &[Vec<f64>; 3], is_solid: impl Fn([usize; 3]) -> bool) -> TriMesh {
+    let counts = planes.each_ref().map(|planes| planes.len() - 1);
+    let is_solid = |cell: [usize; 3]| (0..3).all(|k| cell[k] < counts[k]) && is_solid(cell);
+    let (mut ids, mut mesh) = (HashMap::new(), TriMesh::default());
+    for index in 0..counts.iter().product() {
+        let cell =
+            [index / counts[2] / counts[1], index / counts[2] % counts[1], index % counts[2]];
+        for (axis, side) in (0..3).flat_map(|axis| [(axis, 0), (axis, 1)]) {
+            let mut other = cell;
+            // Below 0 is a huge number, which is no cell.
+            other[axis] = (cell[axis] + 2 * side).wrapping_sub(1);
+            if !is_solid(cell) || is_solid(other) {
+                continue;
             }
+            let mut square = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[u, v]| {
+                let mut corner = cell;
+                corner[axis] += side;
+                corner[(axis + 1) % 3] += u;
+                corner[(axis + 2) % 3] += v;
+                *ids.entry(corner).or_insert_with(|| {
+                    mesh.vertices.push(Vec3::from([0, 1, 2].map(|k| planes[k][corner[k]])));
+                    mesh.vertices.len() as u32 - 1
+                })
+            });
+            if side == 0 {
+                square.reverse();
+            }
+            let [a, b, c, d] = square;
+            mesh.faces.extend([[a, b, c], [a, c, d]]);
         }
     }
     mesh
+}
+
+/// The unit cube with `n` by `n` squares of two triangles on each side.
+pub fn lattice_cube(n: u32) -> TriMesh {
+    let planes = || (0..=n).map(|k| f64::from(k) / f64::from(n)).collect();
+    cells(&[planes(), planes(), planes()], |_| true)
 }
 
 /// A torus around the z axis with radii 2 and 1.

@@ -5,7 +5,7 @@ use medial::surface::{InsideTest, Side, SignedDistance, TriMesh, TriangleBvh};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use crate::shapes::torus_of;
+use crate::shapes::{inverted, joined, torus_of};
 
 /// Radius of the tube of the tori, around a circle of radius 1.
 const TUBE: f64 = 0.35;
@@ -23,16 +23,9 @@ fn points(count: usize, seed: u64) -> Vec<Vec3> {
 
 #[test]
 fn a_cavity_is_outside() {
-    let mut mesh = torus(48, 32);
     // A second, smaller torus in the tube of the first, turned inside out: winding number 0 there.
-    let cavity = torus(48, 16);
-    let first = mesh.vertices.len() as u32;
-    let shrink = |v: Vec3| {
-        let ring = Vec3::new(v.x, v.y, 0.0).normalize();
-        ring + 0.5 * (v - ring)
-    };
-    mesh.vertices.extend(cavity.vertices.iter().map(|&v| shrink(v)));
-    mesh.faces.extend(cavity.faces.iter().map(|&[a, b, c]| [a + first, c + first, b + first]));
+    let cavity = torus_of([1.0, 0.5 * TUBE], 48, 16);
+    let mesh = joined(&[torus(48, 32), inverted(cavity)]);
     let (tree, test) = (TriangleBvh::new(&mesh).unwrap(), InsideTest::new(&mesh));
     let distance = SignedDistance::closed(&tree, &test);
     for p in points(500, 3) {

@@ -29,47 +29,27 @@ fn crust(mesh: &TriMesh, samples: usize, exact: impl Fn(Vec3) -> f64) -> (TriMes
     (made, farthest)
 }
 
+/// Four times as many samples are half as far apart, and the error goes with the square.
 #[test]
-fn the_crust_of_a_sphere_comes_nearer_as_samples_come_closer() {
-    let ball = shapes::sphere(5);
-    let radius = ball.vertices[0].length();
-    let mut last = f64::INFINITY;
-    for samples in [200, 800, 3200] {
-        let (crust, farthest) = crust(&ball, samples, |p| p.length() - radius);
-        let report = surface::validate(&crust).unwrap();
-        assert_eq!((report.components, report.genus), (1, Some(0)), "{samples} samples");
-        // Four times as many samples are half as far apart, and the error goes with the square.
-        assert!(farthest < 0.5 * last, "{samples} samples: {farthest} after {last}");
-        last = farthest;
+fn crusts_come_nearer_as_samples_come_closer() {
+    type Case = (TriMesh, usize, &'static [usize], f64, f64, fn(Vec3) -> f64);
+    let cases: [Case; 2] = [
+        (shapes::sphere(5), 0, &[200, 800, 3200], 0.5, 0.01, |p| p.length() - 1.0),
+        (shapes::torus(96, 192), 1, &[1500, 6000], 0.6, 0.02, |p| {
+            (p.x.hypot(p.y) - 2.0).hypot(p.z) - 1.0
+        }),
+    ];
+    for (mesh, genus, counts, factor, most, exact) in cases {
+        let mut last = f64::INFINITY;
+        for &samples in counts {
+            let (crust, farthest) = crust(&mesh, samples, exact);
+            let report = surface::validate(&crust).unwrap();
+            assert_eq!((report.components, report.genus), (1, Some(genus)), "{samples} samples");
+            assert!(farthest < factor * last, "{samples} samples: {farthest} after {last}");
+            last = farthest;
+        }
+        assert!(last < most, "{last}");
     }
-    assert!(last < 0.01 * radius, "{last}");
-}
-
-#[test]
-fn the_crust_of_a_torus_is_a_torus() {
-    let torus = shapes::torus(96, 192);
-    // Its radii, from the largest extents.
-    let (lo, hi) = torus.bounding_box().unwrap();
-    let extent = hi - lo;
-    let axis = (0..3).min_by(|&i, &j| extent[i].total_cmp(&extent[j])).unwrap();
-    let small = extent[axis] / 2.0;
-    let large = extent.max_element() / 2.0 - small;
-    let centre = (lo + hi) / 2.0;
-    let exact = |p: Vec3| {
-        let mut across = p - centre;
-        let along = across[axis];
-        across[axis] = 0.0;
-        (across.length() - large).hypot(along) - small
-    };
-    let mut last = f64::INFINITY;
-    for samples in [1500, 6000] {
-        let (crust, farthest) = crust(&torus, samples, exact);
-        let report = surface::validate(&crust).unwrap();
-        assert_eq!((report.components, report.genus), (1, Some(1)), "{samples} samples");
-        assert!(farthest < 0.6 * last, "{samples} samples: {farthest} after {last}");
-        last = farthest;
-    }
-    assert!(last < 0.02 * small, "{last}");
 }
 
 #[test]

@@ -5,6 +5,8 @@ use std::f64::consts::PI;
 use medial::Vec3;
 use medial::surface::{InsideTest, Sampling, Side, TriMesh, sample};
 use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 use crate::shapes::*;
 
@@ -96,15 +98,9 @@ fn overlapping_and_nested_shells_add_up() {
 fn smooth_shapes_and_random_points() {
     for mesh in [sphere(3), torus(40, 20)] {
         let test = InsideTest::new(&mesh);
-        let mut state = 1_u64;
-        let mut random = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64
-        };
+        let mut rng = Pcg64::seed_from_u64(1);
         for _ in 0..300 {
-            let p = Vec3::new(random(), random(), random()) * 7.0 - 3.5;
+            let p = Vec3::new(rng.random(), rng.random(), rng.random()) * 7.0 - 3.5;
             let angles = solid_angle_winding(&mesh, p);
             assert_eq!(test.winding_number(p), Some(angles.round() as i32), "{p}");
         }

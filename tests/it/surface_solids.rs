@@ -193,9 +193,7 @@ fn surfaces_with_very_many_intersections_are_named_as_unresolved() {
 #[test]
 fn genus_is_that_of_the_solid() {
     let ring = torus(12, 6);
-    let inner = moved(torus(12, 6), |v| {
-        Vec3::new(0.0, 0.0, 0.0) + v * Vec3::new(0.1, 0.1, 0.1) + Vec3::X * 2.0
-    });
+    let inner = moved(torus(12, 6), |v| 0.1 * v + 2.0 * Vec3::X);
     let report = read(&joined(&[ring, inner])).report;
     assert_eq!((report.components, report.genus, report.euler), (2, Some(2), 0));
     assert_eq!(report.expected_betti, Some([1, 2, 1]));
@@ -352,12 +350,9 @@ fn mend(mesh: &TriMesh, options: MendOptions) -> Result<Loaded, SurfaceError> {
 
 /// A lattice box of `n` cells along each side, without the faces that `dropped` names by centroid.
 fn lattice_box(n: u32, dropped: impl Fn(Vec3) -> bool) -> TriMesh {
-    let mut mesh = lattice_cube(n);
-    let centroid = |face: usize| mesh.triangle(face).into_iter().sum::<Vec3>() / 3.0;
-    let keep: Vec<bool> = (0..mesh.faces.len()).map(|face| !dropped(centroid(face))).collect();
-    let mut keep = keep.iter();
-    mesh.faces.retain(|_| keep.next() == Some(&true));
-    mesh
+    let TriMesh { vertices, mut faces } = lattice_cube(n);
+    faces.retain(|face| !dropped(face.map(|v| vertices[v as usize]).iter().sum::<Vec3>() / 3.0));
+    TriMesh { vertices, faces }
 }
 
 #[test]
@@ -406,12 +401,7 @@ fn holes_that_meet_are_separated() {
 
 #[test]
 fn parts_that_touch_in_a_vertex_are_drawn_apart() {
-    let mut both = lattice_box(1, |_| false);
-    let shift = both.vertices.len() as u32;
-    both.vertices.extend_from_within(..);
-    both.vertices[shift as usize..].iter_mut().for_each(|v| *v += Vec3::ONE);
-    both.faces.extend_from_within(..);
-    both.faces[12..].iter_mut().for_each(|face| *face = face.map(|v| v + shift));
+    let both = joined(&[cube(), moved(cube(), |v| v + Vec3::ONE)]);
     let mended = mend(&both, MendOptions::default()).expect("two solids");
     assert_eq!(mended.report.expected_betti, Some([2, 0, 0]));
     assert!((mended.report.volume.expect("closed") - 2.0).abs() < 2e-3);
@@ -428,11 +418,8 @@ fn parts_that_touch_in_a_vertex_are_drawn_apart() {
 
 #[test]
 fn the_largest_part_is_kept() {
-    let mut both = lattice_box(2, |_| false);
-    let small = lattice_box(1, |p| p.z == 1.0);
-    let shift = both.vertices.len() as u32;
-    both.faces.splice(0..0, small.faces.iter().map(|face| face.map(|v| v + shift)));
-    both.vertices.extend(small.vertices.iter().map(|&v| v * 0.5 + Vec3::splat(3.0)));
+    let small = moved(lattice_box(1, |p| p.z == 1.0), |v| 0.5 * v + 3.0);
+    let both = joined(&[small, lattice_cube(2)]);
     let options = MendOptions { components: Components::Largest(1), ..MendOptions::default() };
     let mended = mend(&both, options).expect("a solid");
     assert_eq!((mended.report.components, mended.mesh.faces.len()), (1, 48));
