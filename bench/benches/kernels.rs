@@ -1,20 +1,23 @@
-//! The predicates call by call, triangulations of random and degenerate points, unions of balls, and distances to a mesh
-//! and to a union of medial primitives.
+//! The predicates call by call, triangulations of random and degenerate points, unions of balls, distances to a mesh and
+//! to a union of medial primitives, and what measuring a result costs. `medial diff --run` times the methods.
 
 #![allow(missing_docs)]
 
-mod plan;
-
 use std::hint::black_box;
+use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use medial::Vec3;
-use medial::complex::{MedialMesh, MedialUnion, UnionAxis};
+use medial::complex::{MedialMesh, MedialUnion, UnionAxis, betti};
 use medial::geometry::delaunay::Delaunay;
 use medial::geometry::predicates::{circumsphere, in_sphere, orient3d};
 use medial::geometry::regular::Regular;
 use medial::geometry::{CellId, DualComplex, Poles, Sphere, UnionBoundary};
+use medial::metrics::{JudgeOptions, spikes, triangle_quality};
+use medial::shape::ShapeOptions;
+use medial::simplifier::{Level, Params, RunContext};
 use medial::surface::TriangleBvh;
+use medial_run::input::{Input, Source};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -172,10 +175,47 @@ fn distances(c: &mut Criterion) {
     group.finish();
 }
 
+/// Everything that the judge does, and its parts, on results of Q-MAT of three sizes.
+fn metrics(criterion: &mut Criterion) {
+    let source = Source::BuiltIn { id: "blob".into(), resolution: Some(40) };
+    let input = Input::load(&source).expect("a built-in shape");
+    let shape = input.shape(ShapeOptions::default()).expect("an extent");
+    let qmat = medial_methods::find("qmat").expect("registered");
+    let mut levels =
+        qmat.prepare(&shape, &Params::none(), &RunContext::default()).expect("prepared");
+    let meshes: [MedialMesh; 3] =
+        [2000, 500, 100].map(|spheres| levels.at(Level::Spheres(spheres)).expect("a level").mesh);
+    // As `medial compare` measures.
+    let options = JudgeOptions { samples: 10_000, volume_depth: 5, ..JudgeOptions::default() };
+    let judge = shape.judge(None, options).expect("the shape has faces");
+    let mut group = criterion.benchmark_group("metrics");
+    for mesh in &meshes {
+        let name = |what| BenchmarkId::new(what, format!("{} spheres", mesh.spheres.len()));
+        group.bench_function(name("everything"), |b| b.iter(|| judge.evaluate(black_box(mesh))));
+        group.bench_function(name("distances"), |b| b.iter(|| judge.distances(black_box(mesh))));
+        group.bench_function(name("volume"), |b| b.iter(|| judge.volume_error(black_box(mesh))));
+        group.bench_function(name("topology"), |b| b.iter(|| betti(black_box(mesh))));
+        group.bench_function(name("quality and spikes"), |b| {
+            b.iter(|| (triangle_quality(black_box(mesh)), spikes(black_box(mesh))));
+        });
+    }
+    group.finish();
+}
+
+/// Two seconds for each benchmark, more for slow ones, which take the least number of samples.
+fn plan() -> Criterion {
+    Criterion::default()
+        .warm_up_time(Duration::from_millis(300))
+        .measurement_time(Duration::from_millis(1700))
+        .sample_size(10)
+        // With few samples, more resamples add no information.
+        .nresamples(10_000)
+}
+
 criterion_group! {
     name = benches;
-    config = plan::criterion();
-    targets = predicates, triangulations, unions, distances
+    config = plan();
+    targets = predicates, triangulations, unions, distances, metrics
 }
 
 criterion_main!(benches);
