@@ -12,7 +12,6 @@ use medial_run::record::{Record, Status};
 use medial_run::text::{counted, grouped, significant};
 
 use crate::comparison::{Comparison, Entry, reached};
-use crate::header::Header;
 use crate::metric::{CENTRALITY, COMPLETENESS, HAUSDORFF, MIN_ANGLE, TOTAL_SECONDS, median};
 use crate::statistics::{FEWEST, Pairs, Sample};
 use crate::summary::{Ratio, reference, topology};
@@ -65,17 +64,10 @@ struct Criterion {
 }
 
 /// The table "Which method?"; `None` where nothing compares. With one mesh it shows results instead of medians.
-pub(crate) fn purpose_table(
-    comparison: &Comparison<'_>,
-    header: &Header,
-    how: &str,
-) -> Option<Table> {
+pub(crate) fn purpose_table(comparison: &Comparison<'_>, how: &str) -> Option<Table> {
     let mut rows = vec![];
     if let Some((level, spheres)) = usual_level(comparison) {
         rows.extend(at_count(comparison, level, spheres));
-        for (name, meshes) in &header.groups {
-            rows.extend(in_group(comparison, level, spheres, (name, meshes)));
-        }
     }
     if let Some((level, spheres)) = level_nearest(comparison, DETAILED) {
         rows.extend(closest_structure(comparison, level, spheres));
@@ -153,23 +145,6 @@ fn closest_structure(
     let title = format!("closest structure at {}", counted(spheres, "sphere", "spheres"));
     let text = |value| format!("axis missed and off centre {} %", significant(value, 3));
     criterion_row(comparison, &Criterion { title, values, text, of: "its distance" })
-}
-
-/// The row of the lowest error among the meshes of a group.
-fn in_group(
-    comparison: &Comparison<'_>,
-    level: usize,
-    spheres: usize,
-    (name, meshes): (&str, &[String]),
-) -> Option<Vec<Cell>> {
-    let mut values = errors_at(comparison, level);
-    for own in &mut values {
-        for (mesh, found) in comparison.meshes.iter().zip(own) {
-            *found = found.filter(|_| meshes.contains(mesh));
-        }
-    }
-    let title = format!("{name}: lowest error at {}", counted(spheres, "sphere", "spheres"));
-    criterion_row(comparison, &error_criterion(values, title))
 }
 
 fn error_criterion(values: Vec<Values>, title: String) -> Criterion {

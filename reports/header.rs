@@ -1,7 +1,5 @@
 //! The head of a report: the runs, their dates, their machines, the methods.
 
-use std::collections::BTreeMap;
-
 use medial::simplifier::{MethodInfo, ParamInfo, Presentation};
 use medial_run::record::Machine;
 use medial_run::text::file_stems;
@@ -26,9 +24,6 @@ pub struct Header {
     /// Remarks on all of it, such as lines of the results that could not be read.
     #[serde(default)]
     pub notes: Vec<String>,
-    /// Groups of meshes by name, which "Which method?" ranks by themselves.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub groups: BTreeMap<String, Vec<String>>,
     /// Whether the page is part of a [site](crate::write_site).
     #[serde(skip)]
     pub is_site: bool,

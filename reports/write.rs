@@ -56,7 +56,7 @@ pub fn write_report(
         false => files.write("results.csv", &csv)?,
     }
 
-    let answers = purpose_table(&comparison, header, &how);
+    let answers = purpose_table(&comparison, &how);
     let mut equal_error: Vec<Table> = equal_error_table(&comparison, &how).into_iter().collect();
     let mut means = vec![means_table(&comparison, &summaries, &how)];
     if !natives.is_empty() {

@@ -237,15 +237,6 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
         study.dataset.clear();
     }
     replace(&mut study.dataset, &arguments.dataset);
-    if !is_example {
-        let gone = study.retain_groups()?;
-        if !gone.is_empty() {
-            note(
-                global,
-                &format!("groups: left out {}, which this command replaces", gone.join(", ")),
-            );
-        }
-    }
     // A folder: names of editions stay.
     let against = arguments.against.as_ref();
     let against = against.map(|path| if path.is_dir() { absolute(path) } else { path.clone() });

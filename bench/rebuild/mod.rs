@@ -173,7 +173,6 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
         methods: earlier.methods,
         study: fs::read_to_string(dir.join(STUDY)).ok(),
         notes: warnings.to_vec(),
-        groups: Study::read(&dir.join(STUDY)).map(|study| study.groups).unwrap_or_default(),
         is_site: false,
     };
     for record in records {

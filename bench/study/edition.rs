@@ -266,7 +266,6 @@ impl Edition {
             .map(|record| (place(record), record))
             .collect();
         let mut repeated: BTreeMap<String, bool> = BTreeMap::new();
-        let mut ratios: Vec<f64> = vec![];
         // By method: number of results here, and the ratios of errors where results differ.
         let mut errors: BTreeMap<String, (usize, Vec<f64>)> = BTreeMap::new();
         for record in &frozen {
@@ -281,9 +280,6 @@ impl Edition {
             }
             let own = own.filter(|own| own.result_hash == record.result_hash);
             *repeated.entry(row(record)).or_insert(true) &= own.is_some();
-            let total = |record: &Record| Some(record.simplify.seconds?.total).filter(|&s| s > 0.0);
-            let own = own.filter(|own| own.ran_alone() && own.simplify.method != INITIAL);
-            ratios.extend(own.and_then(|own| Some(total(own)? / total(record)?)));
         }
         frozen.retain(|record| !repeated[&row(record)]);
         records.extend(frozen);
@@ -302,14 +298,6 @@ impl Edition {
                     mean(differing)
                 ));
             }
-        }
-        if !ratios.is_empty() {
-            notes.push(format!(
-                "This machine takes {} times the seconds of edition {}: geometric mean over {} equal results.",
-                mean(&ratios),
-                edition.name,
-                ratios.len()
-            ));
         }
         let left_out: BTreeSet<&str> = others.iter().map(|record| record.mesh.as_str()).collect();
         let list = |names: Vec<String>| names.join(", ");

@@ -11,7 +11,7 @@ pub mod edition;
 pub mod external;
 pub mod registry;
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use medial::complex::DualTriangulation;
@@ -28,7 +28,7 @@ use medial_run::scene::{Noise, SceneSpec};
 use medial_run::settings::{Settings, VOLUME_DEPTH};
 use medial_run::text::did_you_mean;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
 use crate::exit::Failure;
 use crate::plugin::line_of;
@@ -67,8 +67,8 @@ pub struct Study {
     pub folder: Option<PathBuf>,
     /// Surface files, `builtin:ID[:RESOLUTION]` or `dataset:NAME`.
     pub meshes: Vec<PathBuf>,
-    /// Further sets of meshes: `builtin`, or a set of the library. A text or a list of texts.
-    #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "one_or_more")]
+    /// Further sets of meshes: `builtin`, or sets of the library.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub dataset: Vec<String>,
     /// Numbers of spheres.
     pub spheres: Vec<usize>,
@@ -122,9 +122,6 @@ pub struct Study {
     pub plugins: Vec<PathBuf>,
     /// Further methods that start from the output of each filter.
     pub after_filters: Vec<String>,
-    /// Groups of meshes by name, which the report ranks by themselves: names of meshes as in the tables.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub groups: BTreeMap<String, Vec<String>>,
     /// Methods with their parameters [default: all but those on request].
     #[serde(rename = "method")]
     pub methods: Vec<StudyMethod>,
@@ -156,20 +153,6 @@ pub struct StudyMethod {
     pub published: Option<bool>,
 }
 
-/// Reads a text, or a list of texts.
-fn one_or_more<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<String>, D::Error> {
-    #[derive(Deserialize)]
-    #[serde(untagged, expecting = "a text or a list of texts")]
-    enum Words {
-        One(String),
-        More(Vec<String>),
-    }
-    Ok(match Words::deserialize(deserializer)? {
-        Words::One(word) => vec![word],
-        Words::More(words) => words,
-    })
-}
-
 impl Default for Study {
     fn default() -> Self {
         Self {
@@ -195,7 +178,6 @@ impl Default for Study {
             jobs: 1,
             memory: None,
             keep: Keep::default(),
-            groups: BTreeMap::new(),
             against: None,
             plugins: vec![],
             after_filters: vec![],
@@ -258,14 +240,12 @@ impl Study {
     fn check_names(&self) -> Result<(), String> {
         let methods = self.methods.iter().filter_map(|method| method.name.as_ref());
         let given = self.given.iter().map(|given| &given.name);
-        let groups =
-            self.groups.iter().flat_map(|(group, meshes)| [group].into_iter().chain(meshes));
         let is_shown = |name: &&String| {
             !name.trim().is_empty()
                 && name.chars().count() <= LONGEST_NAME
                 && !name.contains(char::is_control)
         };
-        match methods.chain(given).chain(groups).find(|name| !is_shown(name)) {
+        match methods.chain(given).find(|name| !is_shown(name)) {
             None => Ok(()),
             Some(name) => Err(format!(
                 "invalid name (found {}, expected 1 to {LONGEST_NAME} characters without control characters)",
@@ -432,7 +412,6 @@ impl Study {
         let sources = self.sources()?;
         let names = unique_names(&sources);
         let files = self.external_files(&names)?;
-        self.check_groups(&names)?;
         let mut items = Vec::new();
         for (source, mesh) in sources.iter().zip(names) {
             // Without loading it: a refused file is a row of the results, not an error of the study.
@@ -482,44 +461,6 @@ impl Study {
             spheres_alone: self.spheres_alone,
             threads: self.threads.unwrap_or_else(rayon::current_num_threads),
         }
-    }
-
-    /// The names of all meshes, clean and with noise.
-    fn mesh_names(&self, names: &[String]) -> Vec<String> {
-        let noisy =
-            self.noise.iter().flat_map(|&eta| names.iter().map(move |name| noisy(name, eta)));
-        names.iter().cloned().chain(noisy).collect()
-    }
-
-    /// Leaves out of the groups the meshes that other ones replace, and returns their names.
-    ///
-    /// # Errors
-    /// As [`Study::sources`].
-    pub fn retain_groups(&mut self) -> Result<Vec<String>, Failure> {
-        let known = self.mesh_names(&unique_names(&self.sources()?));
-        let mut gone = Vec::new();
-        for meshes in self.groups.values_mut() {
-            gone.extend(meshes.extract_if(.., |mesh| !known.contains(mesh)));
-        }
-        self.groups.retain(|_, meshes| !meshes.is_empty());
-        Ok(gone)
-    }
-
-    /// Refuses groups with meshes that the study does not have.
-    fn check_groups(&self, names: &[String]) -> Result<(), Failure> {
-        let known = self.mesh_names(names);
-        for (group, meshes) in &self.groups {
-            if let Some(mesh) = meshes.iter().find(|mesh| !known.contains(mesh)) {
-                let meant = did_you_mean(mesh, known.iter().map(String::as_str));
-                return Err(Failure::usage(format!(
-                    "group {}: unknown mesh {}{meant} (expected one of: {})",
-                    quoted(group),
-                    quoted(mesh),
-                    known.join(", ")
-                )));
-            }
-        }
-        Ok(())
     }
 
     fn item(

@@ -16,10 +16,9 @@ use medial_run::record::Machine;
 use medial_run::text::{betti, counted, escape_html, grouped, printable};
 use serde_json::{Value, json};
 
-use crate::answers::usual_level;
 use crate::comparison::{Comparison, level_label};
 use crate::header::{Header, MethodNote, RunNote, method_pages};
-use crate::metric::{BELOW_30, COMPARED, EPSILON, HAUSDORFF, Metric, SPHERES_ONLY};
+use crate::metric::{BELOW_30, COMPARED, EPSILON, Metric, SPHERES_ONLY};
 use crate::plots::{Figure, symbol};
 use crate::tables::Table;
 
@@ -199,9 +198,7 @@ impl Page<'_> {
             });
         let runs = &header.runs;
         let command = runs.last().map(|run| &run.command).filter(|command| !command.is_empty());
-        let pictured = (self.meshes.iter().enumerate())
-            .filter(|(_, mesh)| mesh.picture.is_some() || mesh.view.is_some())
-            .map(|(index, _)| index);
+        let pictured = self.meshes.iter().position(|m| m.picture.is_some() || m.view.is_some());
         json!({
             "lead": self.lead(),
             "facts": self.facts(),
@@ -221,7 +218,7 @@ impl Page<'_> {
             "meshes": (0..self.meshes.len()).map(|mesh| self.mesh(mesh)).collect::<Vec<_>>(),
             "answers": self.answers.as_ref().map(without_command),
             "overview": self.overview,
-            "leading": widest_spread(comparison, pictured),
+            "leading": pictured,
             "figures": if is_one { vec![] } else { figures(self.figures) },
             "sections": sections,
             "methods": methods.collect::<Vec<_>>(),
@@ -335,25 +332,6 @@ fn without_command(table: &Table) -> Table {
     let mut table = table.clone();
     table.notes.drain(..table.notes.len().min(1));
     table
-}
-
-/// Of some meshes the one that separates the methods best at the count of the strips: among those that the most
-/// methods ran on the one with the largest ratio of the worst error to the best.
-fn widest_spread(
-    comparison: &Comparison<'_>,
-    meshes: impl Iterator<Item = usize>,
-) -> Option<usize> {
-    let level = usual_level(comparison).map(|(level, _)| level);
-    let ranked = meshes.map(|mesh| {
-        let here = || comparison.of_mesh(mesh).filter(|entry| Some(entry.level) == level);
-        let errors = here().filter(|entry| entry.measured()).filter_map(|e| HAUSDORFF.of(e.record));
-        let (least, most) =
-            errors.fold((f64::INFINITY, 0.0_f64), |(lo, hi), e| (lo.min(e), hi.max(e)));
-        (here().count(), most / least.max(1e-9), mesh)
-    });
-    // Of equal ones the first.
-    let best = ranked.max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(b.2.cmp(&a.2)));
-    best.map(|(_, _, mesh)| mesh)
 }
 
 fn described(note: &MethodNote) -> Value {

@@ -209,8 +209,7 @@ const start = async () => {
   } else if (report.leading !== null) {
     const mesh = report.meshes[report.leading];
     const way = make("a", { href: "#meshes" }, "Pictures, 3D views and curves of each mesh");
-    const why = `${mesh.name} is shown: among the meshes that most methods ran on, the one with the largest spread of errors. `;
-    parts.push(section("pictures", "Pictures", strip(mesh, `#mesh-${mesh.stem}`), mesh.view && viewOf(mesh.view), make("p", {}, why, way)));
+    parts.push(section("pictures", "Pictures", strip(mesh, `#mesh-${mesh.stem}`), mesh.view && viewOf(mesh.view), make("p", {}, `${mesh.name} is shown. `, way)));
   }
   if (curves.length) parts.push(section("curves", "Error against spheres and time", plotsOf(curves)));
   if (report.overview) {
