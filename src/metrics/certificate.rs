@@ -234,7 +234,7 @@ impl Pieces for SurfaceSide<'_> {
         }
         let doubt = DOUBT * reach.max(self.goal);
         if depth.upper - depth.lower > doubt {
-            depth = self.boundary.within(centre, depth, 0.5 * doubt, left);
+            depth = self.boundary.within(centre, depth, [0.5 * doubt, 0.0], left);
         }
         *outside = depth.outside.or(*outside);
         Bound { reached: depth.lower, at: centre, upper: depth.upper + reach }

@@ -30,7 +30,7 @@ use crate::geometry::trees::{PointTree, in_morton_order};
 const MAX_EXITS: usize = 12;
 
 /// Limit of pieces in all searches for the largest depth. Then it is a lower bound only.
-const MAX_PIECES: usize = 1 << 19;
+const MAX_PIECES: usize = 1 << 21;
 
 /// Width of the interval around a depth, as a share of the extent of a piece of the surface, above which a search halves
 /// it.
@@ -163,9 +163,15 @@ impl<'a> Boundary<'a> {
         }
     }
 
-    /// The depth of `p` in an interval no wider than `tolerance`, from an interval that is known. The interval may be
-    /// wider once no piece is `left`, from which those of this search are taken.
-    pub fn within(&self, p: Vec3, known: Depth, tolerance: f64, left: &mut usize) -> Depth {
+    /// The depth of `p` in an interval no wider than a tolerance, or that ends below a depth that is `enough`, from an
+    /// interval that is known. The interval may be wider once no piece is `left`, from which those of this search are taken.
+    pub fn within(
+        &self,
+        p: Vec3,
+        known: Depth,
+        [tolerance, enough]: [f64; 2],
+        left: &mut usize,
+    ) -> Depth {
         if *left == 0 {
             return known;
         }
@@ -190,7 +196,8 @@ impl<'a> Boundary<'a> {
             }
             let Some(Reverse(open)) = heap.pop() else { break };
             depth.lower = open.least.clamp(depth.lower, depth.upper);
-            if depth.upper - depth.lower <= tolerance || *left == 0 {
+            let is_known = depth.upper - depth.lower <= tolerance || depth.upper <= enough;
+            if is_known || *left == 0 {
                 return depth;
             }
             parts.clear();
@@ -245,23 +252,37 @@ impl<'a> Boundary<'a> {
     pub fn deepest_of(&self, mut peaks: Vec<Peak>) -> (Option<Peak>, bool) {
         peaks.sort_by(|a, b| b.distance.total_cmp(&a.distance));
         let (mut best, mut near, mut left): (Option<Peak>, _, _) = (None, 0, MAX_PIECES);
-        let mut depths = vec![None; peaks.len()];
+        let raise = |best: &mut Option<Peak>, point, distance| {
+            if best.is_none_or(|best| best.distance < distance) {
+                *best = Some(Peak { point, distance });
+            }
+        };
+        let most = |best: Option<Peak>| best.map_or(f64::NEG_INFINITY, |best| best.distance);
+        // Lower bounds of all come first: the larger one is known, the earlier a search can end.
+        let mut depths = Vec::new();
+        for peak in &peaks {
+            if peak.distance <= most(best) {
+                break;
+            }
+            let mut depth = self.of(peak.point, &mut near);
+            if !self.is_exact(&depth) {
+                // Samples may lie on the boundary by rounding only: their distance is no proof.
+                depth.upper = depth.upper.min(peak.distance * (1.0 + SHARES[1]) + self.margin);
+            }
+            raise(&mut best, peak.point, depth.lower);
+            depths.push(depth);
+        }
         for share in SHARES {
-            for (peak, known) in peaks.iter().zip(&mut depths) {
-                let most = best.map_or(f64::NEG_INFINITY, |best: Peak| best.distance);
-                if peak.distance <= most || left == 0 {
+            for (peak, depth) in peaks.iter().zip(&mut depths) {
+                let enough = most(best);
+                if peak.distance <= enough || left == 0 {
                     break;
                 }
-                let depth = known.get_or_insert_with(|| self.of(peak.point, &mut near));
-                if !self.is_exact(depth) && depth.upper > most {
-                    // Samples may lie on the boundary by rounding only: their distance is no proof.
-                    depth.upper = depth.upper.min(peak.distance * (1.0 + SHARES[1]) + self.margin);
+                if !self.is_exact(depth) && depth.upper > enough {
                     // Without a point outside, the bound is infinite.
                     let tolerance = share * depth.upper.min(self.patches.diameter);
-                    *depth = self.within(peak.point, *depth, tolerance, &mut left);
-                }
-                if depth.lower > most {
-                    best = Some(Peak { point: peak.point, distance: depth.lower });
+                    *depth = self.within(peak.point, *depth, [tolerance, enough], &mut left);
+                    raise(&mut best, peak.point, depth.lower);
                 }
             }
         }

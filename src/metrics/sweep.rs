@@ -195,7 +195,7 @@ impl Surface for SweptSurface<'_> {
             depth = self.boundary.nearer(centre, depth);
             if depth.upper + reach > enough && depth.upper - depth.lower > DOUBT * reach {
                 let doubt = DOUBT * reach;
-                depth = self.boundary.within(centre, depth, 0.5 * doubt, &mut near.left);
+                depth = self.boundary.within(centre, depth, [0.5 * doubt, 0.0], &mut near.left);
                 // Parts of a piece do not resolve what a search that had to end left open.
                 depth.upper = depth.upper.min(depth.lower + doubt);
             }
