@@ -11,8 +11,6 @@
 //! | 2 | 2^126 | 10 |
 //! | 3 | 2^1279, that is any two coordinates below 2^190 | 100 |
 //!
-//! Before tier 3, each axis is tried on a separate quantum.
-//!
 //! Compared with floating-point expansions: no branch depends on the data beyond the choice of
 //! the tier, exact zeros (cospherical points) cost no more than other values, and nothing overflows
 //! or underflows.
@@ -57,10 +55,8 @@ pub(super) fn orient3d(
     }
     match differences([b, c, d], a, i32::MAX).0 {
         Differences::One(d) => integers::det3_sign(&d),
-        Differences::Two(d) => det3::<2, 4, 6>(&widen(&d)).sign(),
-        Differences::Any(wide) => {
-            orient3d_scaled([b, c, d], a).unwrap_or_else(|| det3::<20, 40, 60>(&wide).sign())
-        }
+        Differences::Two(d) => det3::<2, 4, 6>(&d).sign(),
+        Differences::Any(d) => det3::<20, 40, 60>(&d).sign(),
     }
 }
 
@@ -74,28 +70,19 @@ pub(crate) fn collinear(a: &[f64; 3], b: &[f64; 3], c: &[f64; 3]) -> bool {
     }
     match differences([b, c], a, i32::MAX).0 {
         Differences::One(d) => parallel::<1, 2>(widen(&d)),
-        Differences::Two(d) => parallel::<2, 4>(widen(&d)),
+        Differences::Two(d) => parallel::<2, 4>(d),
         Differences::Any(d) => parallel::<20, 40>(d),
     }
 }
 
+/// The sign of the determinant of four differences with their lifts, increased by offsets.
 #[inline]
 fn in_sphere_det<const D: usize, const D2: usize, const D3: usize, const D5: usize>(
-    points: &[[Wide<D>; 3]; 4],
+    [a, b, c, d]: &[[Wide<D>; 3]; 4],
     offset: &[Wide<D2>; 4],
 ) -> Sign {
-    let [a, b, c, d] = points;
     let lifts: [Wide<D2>; 4] = [a, b, c, d].map(|p| dot(p, p));
     let lifts = [0, 1, 2, 3].map(|i| lifts[i].add(offset[i]));
-    lifted_det::<D, D2, D3, D2, D5>(points, &lifts)
-}
-
-/// The sign of the determinant of four differences with their lifts; `R = D3 + L`.
-#[inline]
-fn lifted_det<const D: usize, const D2: usize, const D3: usize, const L: usize, const R: usize>(
-    [a, b, c, d]: &[[Wide<D>; 3]; 4],
-    lifts: &[Wide<L>; 4],
-) -> Sign {
     let ab: Wide<D2> = minor(a, b);
     let bc: Wide<D2> = minor(b, c);
     let cd: Wide<D2> = minor(c, d);
@@ -106,8 +93,8 @@ fn lifted_det<const D: usize, const D2: usize, const D3: usize, const L: usize, 
     let bcd: Wide<D3> = cd.mul::<D, D3>(b[2]).sub(bd.mul(c[2])).add(bc.mul(d[2]));
     let cda: Wide<D3> = da.mul::<D, D3>(c[2]).add(ac.mul(d[2])).add(cd.mul(a[2]));
     let dab: Wide<D3> = ab.mul::<D, D3>(d[2]).add(bd.mul(a[2])).add(da.mul(b[2]));
-    let inside: Wide<R> = bcd
-        .mul::<L, R>(lifts[0])
+    let inside: Wide<D5> = bcd
+        .mul::<D2, D5>(lifts[0])
         .sub(cda.mul(lifts[1]))
         .add(dab.mul(lifts[2]))
         .sub(abc.mul(lifts[3]));
@@ -122,9 +109,8 @@ pub(super) fn in_sphere(p: [&[f64; 3]; 4], e: &[f64; 3], grid: Option<Grid>) -> 
     }
     match differences(p, e, i32::MAX).0 {
         Differences::One(d) => integers::lifted_sign(&d, &[0; 4]),
-        Differences::Two(d) => in_sphere_det::<2, 4, 6, 10>(&widen(&d), &[Wide::ZERO; 4]),
-        Differences::Any(d) => in_sphere_scaled(p, e)
-            .unwrap_or_else(|| in_sphere_det::<20, 40, 60, 100>(&d, &[Wide::ZERO; 4])),
+        Differences::Two(d) => in_sphere_det::<2, 4, 6, 10>(&d, &[Wide::ZERO; 4]),
+        Differences::Any(d) => in_sphere_det::<20, 40, 60, 100>(&d, &[Wide::ZERO; 4]),
     }
 }
 
@@ -136,11 +122,11 @@ pub(super) fn power_test(p: [(&[f64; 3], f64); 4], e: (&[f64; 3], f64)) -> Sign 
     let (d, quantum) = differences(p.map(|q| q.0), e.0, range.quantum_cap());
     let unit = 2 * quantum;
     match range.tier(d, unit) {
-        Tier::One(d) => {
+        Differences::One(d) => {
             integers::lifted_sign(&d, &weights.map(|w: f64| to_i128(e.1, unit) - to_i128(w, unit)))
         }
-        Tier::Two(d) => in_sphere_det::<2, 4, 6, 10>(&d, &offsets(e.1, weights, unit)),
-        Tier::Any(d) => in_sphere_det::<20, 40, 60, 100>(&d, &offsets(e.1, weights, unit)),
+        Differences::Two(d) => in_sphere_det::<2, 4, 6, 10>(&d, &offsets(e.1, weights, unit)),
+        Differences::Any(d) => in_sphere_det::<20, 40, 60, 100>(&d, &offsets(e.1, weights, unit)),
     }
 }
 
@@ -178,22 +164,15 @@ impl WeightRange {
     }
 
     /// The narrowest tier that holds differences, and these weights in units of `2^unit`.
-    pub(super) fn tier<const K: usize>(self, differences: Differences<K>, unit: i32) -> Tier<K> {
+    pub(super) fn tier<const K: usize>(self, found: Differences<K>, unit: i32) -> Differences<K> {
         // The limits leave room in a lift for three squares, a difference of weights and the sign.
-        match differences {
-            Differences::One(d) if self.fits(122, unit) => Tier::One(d),
-            Differences::One(d) if self.fits(250, unit) => Tier::Two(widen(&d)),
-            Differences::Two(d) if self.fits(250, unit) => Tier::Two(widen(&d)),
-            d => Tier::Any(d.into_wide()),
+        match found {
+            Differences::One(_) if self.fits(122, unit) => found,
+            Differences::One(d) if self.fits(250, unit) => Differences::Two(widen(&d)),
+            Differences::Two(_) if self.fits(250, unit) => found,
+            _ => Differences::Any(found.into_wide()),
         }
     }
-}
-
-/// Differences of `K` points to an origin in the words of a tier.
-pub(super) enum Tier<const K: usize> {
-    One([[i64; 3]; K]),
-    Two([[Wide<2>; 3]; K]),
-    Any([[Wide<20>; 3]; K]),
 }
 
 /// The orthocentre of four weighted points minus `p[0]`, each coordinate correct to a few units
@@ -205,9 +184,11 @@ pub(super) fn orthocentre(p: [(&[f64; 3], f64); 4]) -> Option<[f64; 3]> {
     let ([first, others @ ..], unit) = (weights, 2 * quantum);
     // Samples of plane faces have many nearly flat cells, so that narrow tiers matter.
     match range.tier(d, unit) {
-        Tier::One(d) => cramer::<1, 2, 3, 4>(&widen(&d), &offsets(first, others, unit), quantum),
-        Tier::Two(d) => cramer::<2, 4, 6, 8>(&d, &offsets(first, others, unit), quantum),
-        Tier::Any(d) => cramer::<20, 40, 60, 80>(&d, &offsets(first, others, unit), quantum),
+        Differences::One(d) => {
+            cramer::<1, 2, 3, 4>(&widen(&d), &offsets(first, others, unit), quantum)
+        }
+        Differences::Two(d) => cramer::<2, 4, 6, 8>(&d, &offsets(first, others, unit), quantum),
+        Differences::Any(d) => cramer::<20, 40, 60, 80>(&d, &offsets(first, others, unit), quantum),
     }
 }
 
@@ -318,7 +299,7 @@ pub(super) fn to_wide<const N: usize>(x: f64, quantum: i32) -> Wide<N> {
 /// Differences of `K` points to an origin as integers, in the narrowest tier that holds them.
 pub(super) enum Differences<const K: usize> {
     One([[i64; 3]; K]),
-    Two([[i128; 3]; K]),
+    Two([[Wide<2>; 3]; K]),
     Any([[Wide<20>; 3]; K]),
 }
 
@@ -327,7 +308,7 @@ impl<const K: usize> Differences<K> {
     fn into_wide(self) -> [[Wide<20>; 3]; K] {
         match self {
             Self::One(d) => widen(&d),
-            Self::Two(d) => widen(&d),
+            Self::Two(d) => d.map(|p| p.map(Wide::extended)),
             Self::Any(d) => d,
         }
     }
@@ -454,7 +435,7 @@ pub(super) fn differences<const K: usize>(
     if reach >> integers::BITS == 0 {
         (Differences::One(wide.map(|p| p.map(|x| x as i64))), quantum)
     } else {
-        (Differences::Two(wide), quantum)
+        (Differences::Two(widen(&wide)), quantum)
     }
 }
 
@@ -463,108 +444,6 @@ pub(super) fn widen<T: Copy + Into<i128>, const K: usize, const N: usize>(
     d: &[[T; 3]; K],
 ) -> [[Wide<N>; 3]; K] {
     d.map(|p| p.map(|x| Wide::from_i128(x.into())))
-}
-
-// The exact stage for axes of very different extents, such as a solid flattened to `1e-100`.
-//
-// With one common quantum such coordinates span hundreds of bits, although those of each axis do
-// not. A determinant keeps its sign when an axis is scaled by a power of two. So does the lifted
-// determinant, provided that the lifts are still summed in a common unit: only they become long.
-//
-// 1. Each axis is scaled so that its largest coordinate is in `[1/2, 1)`.
-// 2. Differences, minors and `3 x 3` determinants are those of the first two tiers.
-// 3. The lift of a point is the sum of its squared differences, each shifted by twice the exponent
-//    of its axis.
-
-/// The largest shifts for the two widths of a lift, with room for the bits of three squares and a
-/// sign.
-const SHORT_SHIFT: i32 = 14 * 64 - 256;
-const LONG_SHIFT: i32 = 44 * 64 - 256;
-
-/// Below this exponent a scaled bit could underflow.
-const LOWEST: i32 = -1000;
-
-/// Differences on scaled axes, and the exponent of each axis.
-struct Scaled<const K: usize> {
-    differences: Differences<K>,
-    exponents: [i32; 3],
-}
-
-/// Step 1; `None` where the coordinates of one axis span too many bits by themselves.
-fn scaled<const K: usize>(points: [&[f64; 3]; K], origin: &[f64; 3]) -> Option<Scaled<K>> {
-    let (mut factors, mut exponents) = ([1.0; 3], [0; 3]);
-    for k in 0..3 {
-        let on_axis = points.iter().chain([&origin]).map(|p| p[k]);
-        let top = on_axis.clone().map(highest_bit).max().unwrap_or(i32::MIN);
-        let low = on_axis.map(lowest_bit).min().unwrap_or(i32::MAX);
-        if top == i32::MIN {
-            continue;
-        }
-        exponents[k] = top.max(LOWEST);
-        // The scaled coordinates must be exact, so their lowest bit must not underflow.
-        if low - exponents[k] < LOWEST {
-            return None;
-        }
-        factors[k] = f64::from_bits(((1023 - exponents[k]) as u64) << 52);
-    }
-    let points = points.map(|p| [0, 1, 2].map(|k| p[k] * factors[k]));
-    let origin = [0, 1, 2].map(|k| origin[k] * factors[k]);
-    let differences = differences(points.each_ref(), &origin, i32::MAX).0;
-    Some(Scaled { differences, exponents })
-}
-
-/// The sign of `det(b - a, c - a, d - a)`, where the differences are narrow on scaled axes.
-fn orient3d_scaled(p: [&[f64; 3]; 3], origin: &[f64; 3]) -> Option<Sign> {
-    match scaled(p, origin)?.differences {
-        Differences::One(d) => Some(integers::det3_sign(&d)),
-        Differences::Two(d) => Some(det3::<2, 4, 6>(&widen(&d)).sign()),
-        Differences::Any(_) => None,
-    }
-}
-
-/// The in-sphere test, where the differences are narrow on scaled axes.
-fn in_sphere_scaled(p: [&[f64; 3]; 4], e: &[f64; 3]) -> Option<Sign> {
-    let Scaled { differences, exponents } = scaled(p, e)?;
-    let least = exponents.into_iter().min().unwrap_or(0);
-    let shifts = exponents.map(|exponent| 2 * (exponent - least));
-    let longest = shifts.into_iter().max().unwrap_or(0);
-    match differences {
-        Differences::One(d) if longest <= SHORT_SHIFT => {
-            Some(lifted_det_scaled::<1, 2, 3, 14, 17>(&widen(&d), shifts))
-        }
-        Differences::One(d) if longest <= LONG_SHIFT => {
-            Some(lifted_det_scaled::<1, 2, 3, 44, 47>(&widen(&d), shifts))
-        }
-        Differences::Two(d) if longest <= SHORT_SHIFT => {
-            Some(lifted_det_scaled::<2, 4, 6, 14, 20>(&widen(&d), shifts))
-        }
-        Differences::Two(d) if longest <= LONG_SHIFT => {
-            Some(lifted_det_scaled::<2, 4, 6, 44, 50>(&widen(&d), shifts))
-        }
-        _ => None,
-    }
-}
-
-/// Steps 2 and 3 with differences of `D` words and lifts of `L`; `R = D3 + L`.
-fn lifted_det_scaled<
-    const D: usize,
-    const D2: usize,
-    const D3: usize,
-    const L: usize,
-    const R: usize,
->(
-    d: &[[Wide<D>; 3]; 4],
-    shifts: [i32; 3],
-) -> Sign {
-    lifted_det::<D, D2, D3, L, R>(
-        d,
-        &d.each_ref().map(|p: &[Wide<D>; 3]| {
-            (0..3).fold(Wide::<L>::ZERO, |sum, k| {
-                let square: Wide<D2> = p[k].mul(p[k]);
-                sum.add(square.extended::<L>().shifted(shifts[k] as u32))
-            })
-        }),
-    )
 }
 
 #[cfg(test)]
@@ -597,21 +476,6 @@ mod tests {
             let offset = offsets(w[0], [w[1], w[2], w[3]], 2 * quantum);
             let widest = cramer::<20, 40, 60, 80>(&d.into_wide(), &offset, quantum);
             prop_assert_eq!(orthocentre([0, 1, 2, 3].map(|i| (sites[i], w[i]))), widest);
-        }
-
-        #[test]
-        fn scaled_axes_agree_with_the_widest_tier(
-            p in points(), e in prop::array::uniform3(-900..180i32),
-        ) {
-            let scale = e.map(|e| f64::powi(2.0, e));
-            let flat = p.map(|p| [0, 1, 2].map(|k| p[k] * scale[k]));
-            let [a, b, c, d, e] = flat.each_ref();
-            // Scaling keeps the sign of an orientation; equal weights lead past this file.
-            let [p0, p1, p2, p3, _] = p.each_ref();
-            let known = super::orient3d(p0, p1, p2, p3, None);
-            prop_assert_eq!(orient3d_scaled([b, c, d], a), Some(known));
-            let widest = super::power_test([a, b, c, d].map(|p| (p, 0.0)), (e, 0.0));
-            prop_assert_eq!(in_sphere_scaled([a, b, c, d], e), Some(widest));
         }
     }
 }

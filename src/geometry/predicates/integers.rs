@@ -42,17 +42,6 @@ impl<const N: usize> Wide<N> {
         Wide(limbs)
     }
 
-    /// `self * 2^by`.
-    pub(super) fn shifted(self, by: u32) -> Self {
-        let (limbs, bits) = ((by / 64) as usize, by % 64);
-        let mut moved = [0; N];
-        for i in limbs..N {
-            let low = if bits > 0 && i > limbs { self.0[i - limbs - 1] >> (64 - bits) } else { 0 };
-            moved[i] = self.0[i - limbs] << bits | low;
-        }
-        Self(moved)
-    }
-
     #[inline]
     pub(super) fn add(self, other: Self) -> Self {
         let mut sum = self.0;

@@ -29,7 +29,7 @@
 //! by their *reach* `|d|^2 + |w_0 - w|`. The filter never decides when a difference is so short that
 //! products may underflow, or when a product overflows.
 
-use crate::predicates::exact::{Tier, WeightRange, differences, minor, to_wide, widen};
+use crate::predicates::exact::{Differences, WeightRange, differences, minor, to_wide, widen};
 use crate::predicates::integers::Wide;
 use crate::predicates::{Sign, Site, exact};
 
@@ -188,9 +188,9 @@ fn exact_sign<F: Form<K>, const K: usize>(origin: &Site, others: [&Site; K]) -> 
     let unit = 2 * quantum;
     let w = (origin.w, weights);
     match range.tier(d, unit) {
-        Tier::One(d) => evaluate::<F, K, 1, 2, 3, 4, 6, 8>(&widen(&d), w, unit),
-        Tier::Two(d) => evaluate::<F, K, 2, 4, 6, 8, 12, 16>(&d, w, unit),
-        Tier::Any(d) => evaluate::<F, K, 20, 40, 60, 80, 120, 160>(&d, w, unit),
+        Differences::One(d) => evaluate::<F, K, 1, 2, 3, 4, 6, 8>(&widen(&d), w, unit),
+        Differences::Two(d) => evaluate::<F, K, 2, 4, 6, 8, 12, 16>(&d, w, unit),
+        Differences::Any(d) => evaluate::<F, K, 20, 40, 60, 80, 120, 160>(&d, w, unit),
     }
 }
 
