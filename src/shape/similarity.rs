@@ -6,16 +6,15 @@
 //! simplification has inflated do not matter.
 //!
 //! A similarity `p -> scale p + shift` is sought in four ways: known conventions of tools and factors between units, the
-//! bounding boxes, and from there the least mean of `|D(c) - r|` over the scale alone and over scale and shift, `D` the
-//! signed distance, by Gauss-Newton steps on iteratively reweighted squares. The fewest free parameters win where they fit
-//! nearly as well, or leave the union as near to the surface: a convention is exact, the optimum follows the errors of the
-//! medial mesh. [`Fit::uncertainty`] estimates these.
+//! bounding boxes, and from there the union nearest to the surface over the scale alone and over scale and shift: radii of
+//! many simplified meshes are biased, their union is not. The fewest free parameters win where they leave the union nearly
+//! as near: a convention is exact, the optimum follows the errors of the medial mesh. [`Fit::uncertainty`] estimates these.
 
 use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
-use glam::{BVec3, DMat4, DVec4};
+use glam::BVec3;
 use rayon::prelude::*;
 
 use super::{Shape, ShapeError};
@@ -110,8 +109,8 @@ pub struct Fit {
     /// The same after the similarity.
     pub misfit: Option<f64>,
     /// Error that the fit itself can be, as a fraction of the diagonal: the largest displacement of the surface's bounding
-    /// box between the similarities that fit the radii best, of all spheres and of every other one, and between the one of
-    /// all and that of the nearest union; at least the misfit. 0 for conventions and factors, which are exact.
+    /// box between the similarities of the nearest union, for all points of the surface and for every other one; at least
+    /// the misfit. 0 for conventions and factors, which are exact.
     pub uncertainty: f64,
     /// Whether the mesh has the wrong units without doubt: it fits with the similarity, to 1 % of the diagonal at the median
     /// (5 % for conventions and factors), its union comes at least twice as near to the surface, and no change of the
@@ -168,8 +167,8 @@ const NEARER: f64 = 2.0;
 /// Limit of steps of the optimisation. Where there is an optimum, far fewer suffice.
 const STEPS: usize = 60;
 
-/// Largest ratios of the mean distance of a preferred similarity to that of the best scale, or of the optimum of the radii
-/// to that of the union, and to that of the best scale and shift, whose four parameters follow the errors of the medial mesh.
+/// Largest ratios of the mean distance of a preferred similarity to that of the best scale, and to that of the best scale
+/// and shift, whose four parameters follow the errors of the medial mesh.
 const PREFERENCE: [f64; 2] = [1.5, 3.0];
 
 /// Mean distance of the surface to the union at which any convention is preferred, as a fraction of the diagonal.
@@ -216,19 +215,14 @@ impl Shape {
             let starts = starts.map(|s| (mean(&s), s));
             starts.min_by(|a, b| a.0.total_cmp(&b.0)).expect("the first one").1
         };
-        let nearness = surface.nearness(mesh);
-        // Radii of many simplified meshes are biased, their union is not: the optimum of the radii is a start then.
+        let union = MedialUnion::new(&mesh.to_normal(&surface.units)).ok();
+        let nearness = Nearness { union: union.as_ref(), points: &surface.points };
         let optimum = |start, source| {
-            let by_radii = surface.optimised(&spheres, start, source);
-            let by_union = surface.nearest(&nearness, by_radii, source);
-            let [of_radii, of_union] = [&by_radii, &by_union].map(|found| nearness.of(found));
-            match of_radii <= PREFERENCE[0] * of_union {
-                true => (of_radii, [by_radii, by_union], by_radii),
-                false => (of_union, [by_radii, by_union], by_union),
-            }
+            let found = surface.nearest(&nearness, start, source);
+            (nearness.of(&found), found)
         };
         let scaled = optimum(least(&mut plain.into_iter()), FitSource::Scaled);
-        let mut all = all.chain(Some(scaled.2).filter(fits_box));
+        let mut all = all.chain(Some(scaled.1).filter(fits_box));
         let fitted = optimum(least(&mut all), FitSource::Fitted);
         // The fewest free parameters that leave the union nearly as near as the optimum.
         let with_shift = PREFERENCE[1] * fitted.0;
@@ -238,12 +232,12 @@ impl Shape {
         };
         // What is within the uncertainty of the optimum may be right.
         let [of_scaled, of_fitted] = [(scaled, FitSource::Scaled), (fitted, FitSource::Fitted)]
-            .map(|((_, optima, _), source)| surface.uncertainty(&spheres, optima, source, 0.0));
+            .map(|((_, found), source)| surface.uncertainty(&nearness, &found, source));
         let is_within = |source: FitSource, s: &Similarity| match source.has_no_shift() {
             true => {
-                scaled.0 <= with_shift.max(CLOSE) && surface.displacement(s, &scaled.2) <= of_scaled
+                scaled.0 <= with_shift.max(CLOSE) && surface.displacement(s, &scaled.1) <= of_scaled
             }
-            false => surface.displacement(s, &fitted.2) <= of_fitted,
+            false => surface.displacement(s, &fitted.1) <= of_fitted,
         };
         let best = exact.into_iter().map(|(source, s)| (nearness.of(&s), source, s));
         let misfit = |s: &Similarity| median(&surface.residuals(&spheres, s)).unwrap_or(0.0);
@@ -253,13 +247,13 @@ impl Shape {
                 // A shift that brings the union of a coarse mesh nearer can take the spheres out of place.
                 || source.has_no_shift()
                     && *near <= PREFERENCE[0] * scaled.0
-                    && misfit(s) <= misfit(&fitted.2)
+                    && misfit(s) <= misfit(&fitted.1)
         });
         let best = best.min_by(|a, b| a.0.total_cmp(&b.0));
-        let ((after, optima, normal), source) = match best {
-            Some((near, source, s)) => ((near, [s, s], s), source),
-            None if scaled.0 <= enough(false) => (scaled, FitSource::Scaled),
-            None => (fitted, FitSource::Fitted),
+        let (after, normal, source, uncertainty) = match best {
+            Some((near, source, s)) => (near, s, source, 0.0),
+            None if scaled.0 <= enough(false) => (scaled.0, scaled.1, FitSource::Scaled, of_scaled),
+            None => (fitted.0, fitted.1, FitSource::Fitted, of_fitted),
         };
         let [before, misfit] = [&Similarity::IDENTITY, &normal].map(misfit);
         let is_free = matches!(source, FitSource::Scaled | FitSource::Fitted);
@@ -278,7 +272,7 @@ impl Shape {
             source,
             misfit_before: Some(before),
             misfit: Some(misfit),
-            uncertainty: surface.uncertainty(&spheres, optima, source, misfit),
+            uncertainty: if is_free { uncertainty.max(misfit) } else { 0.0 },
             is_needed,
         })
     }
@@ -399,13 +393,6 @@ impl Surface {
         Similarity { scale, shift: self.units.origin / self.units.diagonal * (scale - 1.0) }
     }
 
-    /// The distances of points of the surface to the union of a medial mesh in input units.
-    fn nearness(&self, mesh: &MedialMesh) -> Nearness<'_> {
-        let units = self.units;
-        let normal = mesh.to_normal(&units);
-        Nearness { union: MedialUnion::new(&normal).ok(), points: &self.points }
-    }
-
     /// The largest displacement of a corner of the surface's box from one similarity to another.
     fn displacement(&self, from: &Similarity, to: &Similarity) -> f64 {
         let corner = |k: u32| {
@@ -415,23 +402,14 @@ impl Surface {
         (0..8).map(|k| moved(corner(k))).fold(0.0, f64::max)
     }
 
-    /// [`Fit::uncertainty`] of a similarity.
-    fn uncertainty(
-        &self,
-        spheres: &[Sphere],
-        [by_radii, by_union]: [Similarity; 2],
-        source: FitSource,
-        misfit: f64,
-    ) -> f64 {
-        if !matches!(source, FitSource::Scaled | FitSource::Fitted) {
-            return 0.0;
-        }
+    /// [`Fit::uncertainty`] of the similarity of the nearest union, without the misfit.
+    fn uncertainty(&self, nearness: &Nearness<'_>, found: &Similarity, source: FitSource) -> f64 {
         let halves = [0, 1].map(|first| {
-            let half: Vec<Sphere> = spheres.iter().skip(first).step_by(2).copied().collect();
-            self.displacement(&by_radii, &self.optimised(&half, by_radii, source))
+            let half: Vec<Vec3> = self.points.iter().skip(first).step_by(2).copied().collect();
+            let nearness = Nearness { union: nearness.union, points: &half };
+            self.displacement(found, &self.nearest(&nearness, *found, source))
         });
-        let between = self.displacement(&by_radii, &by_union);
-        halves.into_iter().fold(misfit.max(between), f64::max)
+        halves.into_iter().fold(0.0, f64::max)
     }
 
     /// From the box around the spheres to the box around the surface.
@@ -450,7 +428,7 @@ impl Surface {
 
     /// `D(c) - r` of every sphere, after a similarity.
     fn residuals(&self, spheres: &[Sphere], similarity: &Similarity) -> Vec<f64> {
-        spheres.par_iter().map(|s| self.residual(&similarity.sphere(s)).0).collect()
+        spheres.par_iter().map(|s| self.residual(&similarity.sphere(s))).collect()
     }
 
     /// The least misfit with the centres in place: after one factor for all radii, or one addition to them.
@@ -473,33 +451,11 @@ impl Surface {
         sum / spheres.len().max(1) as f64 / similarity.scale
     }
 
-    /// `D(c) - r` and the gradient of `D` at `c`.
-    fn residual(&self, sphere: &Sphere) -> (f64, Vec3) {
-        let closest = self.tree.closest(sphere.centre);
-        let sign = if self.inside.side(sphere.centre) == Side::Outside { -1.0 } else { 1.0 };
-        let away = (sphere.centre - closest.point).normalize_or_zero();
-        (sign * closest.distance - sphere.radius, sign * away)
-    }
-
-    /// The least mean of `|D(c) - r|` near a similarity, for `source` with or without a shift.
-    fn optimised(&self, spheres: &[Sphere], start: Similarity, source: FitSource) -> Similarity {
-        let (mut best, mut least) = (start, self.mean(spheres, &start));
-        for _ in 0..STEPS {
-            let Some(step) = self.step(spheres, &best, source) else { break };
-            // The mean is not smooth: half the step, and half of that, may be better than the whole.
-            let tried = (0..8).map(|k| best.moved(step * 0.5_f64.powi(k)));
-            let better = tried
-                .filter(|s| s.scale > 0.0)
-                .map(|s| (self.mean(spheres, &s), s))
-                .find(|(e, _)| *e < least);
-            let Some((error, similarity)) = better else { break };
-            let gain = least - error;
-            (best, least) = (similarity, error);
-            if gain <= 1e-9 * least {
-                break;
-            }
-        }
-        best
+    /// `D(c) - r`.
+    fn residual(&self, sphere: &Sphere) -> f64 {
+        let distance = self.tree.closest(sphere.centre).distance;
+        let is_outside = self.inside.side(sphere.centre) == Side::Outside;
+        (if is_outside { -distance } else { distance }) - sphere.radius
     }
 
     /// The similarity near a start that brings the union nearest to the surface, for `source` with or without a shift:
@@ -540,44 +496,6 @@ impl Surface {
         best
     }
 
-    /// The Gauss-Newton step of shift and scale for squares that are weighted to stand for absolute values.
-    // Without a shift, the scale moves the points away from the origin of the input units.
-    fn step(&self, spheres: &[Sphere], at: &Similarity, source: FitSource) -> Option<DVec4> {
-        let rows: Vec<(f64, DVec4)> = spheres
-            .par_iter()
-            .map(|sphere| {
-                let (residual, gradient) = self.residual(&at.sphere(sphere));
-                (residual, gradient.extend(gradient.dot(sphere.centre) - sphere.radius))
-            })
-            .collect();
-        // The floor keeps spheres that fit already from holding all others back.
-        let floor =
-            1e-3 * rows.iter().map(|(e, _)| e.abs()).sum::<f64>() / rows.len().max(1) as f64;
-        let (mut hessian, mut gradient) = (DMat4::ZERO, DVec4::ZERO);
-        // In order, so that the sum is the same for any number of threads.
-        for (residual, row) in &rows {
-            let weight = 1.0 / residual.abs().max(floor).max(f64::MIN_POSITIVE);
-            let weighted = *row * weight;
-            hessian += DMat4::from_cols(
-                weighted * row.x,
-                weighted * row.y,
-                weighted * row.z,
-                weighted * row.w,
-            );
-            gradient += weighted * *residual;
-        }
-        let trace = (0..4).map(|i| hessian.col(i)[i]).sum::<f64>();
-        let damped = hessian + DMat4::IDENTITY * (1e-12 * trace);
-        let step = match source {
-            FitSource::Scaled => {
-                let along = (self.units.origin / self.units.diagonal).extend(1.0);
-                -along * (along.dot(gradient) / along.dot(damped * along))
-            }
-            _ => -(damped.inverse() * gradient),
-        };
-        step.is_finite().then_some(step)
-    }
-
     /// A similarity of normalised coordinates as one of input units.
     fn in_input_units(&self, normal: &Similarity) -> Similarity {
         let Normalisation { origin, diagonal } = self.units;
@@ -597,24 +515,18 @@ impl FitSource {
 /// The union of a medial mesh, and points of the surface.
 struct Nearness<'a> {
     /// `None` for a mesh without a union.
-    union: Option<MedialUnion>,
+    union: Option<&'a MedialUnion>,
     points: &'a [Vec3],
 }
 
 impl Nearness<'_> {
     /// The mean distance of the points to the boundary of the union after a similarity.
     fn of(&self, similarity: &Similarity) -> f64 {
-        let Some(union) = &self.union else { return f64::INFINITY };
+        let Some(union) = self.union else { return f64::INFINITY };
         let back = |&p: &Vec3| (p - similarity.shift) / similarity.scale;
         let points: Vec<Vec3> = self.points.iter().map(back).collect();
         let sum: f64 = union.signed_batch(&points).into_iter().map(f64::abs).sum();
         sum * similarity.scale / points.len().max(1) as f64
-    }
-}
-
-impl Similarity {
-    fn moved(&self, step: DVec4) -> Self {
-        Self { scale: self.scale + step.w, shift: self.shift + step.truncate() }
     }
 }
 
