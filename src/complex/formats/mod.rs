@@ -3,7 +3,8 @@
 //! | extension | read | written | holds |
 //! |---|---|---|---|
 //! | `.ma` | yes | yes | spheres, edges, faces: the interchange format of the field, in all its dialects |
-//! | `.ma_dup`, `.sph` | yes | no | the same, and lists of spheres alone |
+//! | `.ma_dup` | yes | no | the same |
+//! | `.sph` | yes | no | the same, lists of spheres alone, and trees of spheres, of which the deepest level is read |
 //! | `.txt`, `.xyzr` | yes | rows `x y z r` | the same; written for granular simulations |
 //! | `.csv`, `.json`, `.yaml`, `.yml`, `.xrdf`, `.urdf`, `.xml` | yes | yes | spheres alone, of one link of a robot |
 //! | `.ply` | yes | text | the same, with a vertex property `radius`, for viewers |
@@ -181,7 +182,8 @@ type Parser<'a> = fn(&'a [u8], &str, ReadOptions) -> Result<LoadedMa, MaError>;
 
 fn parser<'a>(path: &Path) -> Result<Parser<'a>, MaError> {
     match extension(path).as_str() {
-        "ma" | "ma_dup" | "sph" => Ok(parse_ma),
+        "ma" | "ma_dup" => Ok(parse_ma),
+        "sph" => Ok(spheres::parse_tree),
         "txt" | "xyzr" => Ok(spheres::parse_clump),
         "ply" => Ok(parse_ply),
         "obj" => Ok(parse_obj),

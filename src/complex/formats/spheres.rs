@@ -4,7 +4,8 @@
 //! |---|---|
 //! | `.csv` | rows `x,y,z,r` below a header |
 //! | `.txt`, `.xyzr` | rows `x y z r` without a header: clumps of spheres |
-//! | `.json` | `{"spheres": [{"center": [x, y, z], "radius": r}, ...]}` |
+//! | `.sph` | the same, or a tree of spheres: depth and branching factor, then rows `x y z r error` by levels (read only) |
+//! | `.json` | `{"spheres": [{"center": [x, y, z], "radius": r}, ...]}`; read also `{"centers": [...], "radii": [...]}` of MorphIt |
 //! | `.yaml`, `.yml` | `collision_spheres: {LINK: [{center: [x, y, z], radius: r}, ...]}` as cuRobo reads it |
 //! | `.xrdf` | the sections `collision` and `geometry` of Isaac's Extended Robot Description Format |
 //! | `.urdf` | `collision` elements with a `sphere`, of a `link` |
@@ -25,7 +26,7 @@ use std::path::Path;
 
 use roxmltree::{Document, Node};
 use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 use serde_saphyr::{MessageFormatter, NonFiniteFloatPolicy, UserMessageFormatter};
 
 use super::ma::{canonical, comments_above, finite, lines, note, parse_ma};
@@ -358,6 +359,51 @@ pub(super) fn parse_clump(bytes: &[u8], name: &str, options: ReadOptions) -> Loa
     }
 }
 
+/// Reads the deepest level of a tree of spheres, as the sphere-tree toolkit writes it, or the lists of [`parse_clump`].
+pub(super) fn parse_tree(bytes: &[u8], name: &str, options: ReadOptions) -> Loaded {
+    let mut rows = lines(bytes, name);
+    let header = rows.next().and_then(|line| {
+        let words = line.text.split_ascii_whitespace().map(|word| word.parse::<usize>().ok());
+        words.collect::<Option<Vec<usize>>>()
+    });
+    let rows: Vec<_> = rows.collect();
+    let children = match header.as_deref() {
+        // Others announce the number of rows.
+        Some(&[depth, children]) if depth != rows.len() => children,
+        _ => return parse_clump(bytes, name, options),
+    };
+    let mut spheres = Vec::new();
+    for line in rows {
+        let words: Vec<&str> = line.text.split_ascii_whitespace().collect();
+        let &[x, y, z, radius, _error] = &words[..] else {
+            let why = format!("{} fields instead of 5 (x y z r error)", words.len());
+            return Err(line.malformed(why));
+        };
+        let number = |word, known| finite(word, known).map_err(|why| line.malformed(why));
+        let centre = Vec3::new(number(x, "x")?, number(y, "y")?, number(z, "z")?);
+        spheres.push(Sphere::new(centre, number(radius, "radius")?));
+    }
+    let (mut above, mut level, mut levels) = (0, 1_usize, 1);
+    while above + level < spheres.len() {
+        above += level;
+        level = level.saturating_mul(children);
+        levels += 1;
+        if level == 0 {
+            break;
+        }
+    }
+    if above + level != spheres.len() {
+        let why = format!("{} rows are no whole levels with {children} children", spheres.len());
+        return Err(malformed(name, None, why));
+    }
+    // A place without a sphere has no radius.
+    spheres.drain(..above);
+    spheres.retain(|sphere| sphere.radius > 0.0);
+    let mut loaded = chosen(vec![Link { spheres, ..Link::default() }], name, options)?;
+    loaded.notes.extend((above > 0).then(|| format!("took the deepest of {levels} levels")));
+    Ok(loaded)
+}
+
 /// Reads every list of spheres in a JSON document: an object for each, with `center` or `origin`, and `radius`.
 pub(super) fn parse_json(bytes: &[u8], name: &str, options: ReadOptions) -> Loaded {
     let Unique(document) = serde_json::from_slice(bytes).map_err(|error| {
@@ -507,6 +553,16 @@ fn collect(value: &Value, key: &str, links: &mut Vec<Link>) -> Result<(), String
 /// Adds the spheres that are values of an object, and the lists below it. Next to a sphere, whatever is nearly one has to
 /// be one: it would be lost.
 fn named(map: &Map<String, Value>, key: &str, links: &mut Vec<Link>) -> Result<(), String> {
+    if let (Some(Value::Array(centres)), Some(Value::Array(radii))) =
+        (map.get("centers"), map.get("radii"))
+    {
+        if centres.len() != radii.len() {
+            return Err(format!("{} centers and {} radii", centres.len(), radii.len()));
+        }
+        let of_each = centres.iter().zip(radii);
+        let items = of_each.map(|(centre, radius)| json!({ "center": centre, "radius": radius }));
+        return collect(&Value::Array(items.collect()), key, links);
+    }
     if map.values().any(|item| has_centre(item) && has_radius(item) && !is_other_shape(item)) {
         let alike = map.iter().filter(|(_, item)| has_centre(item) || has_radius(item));
         links.push(link_of(key, alike.map(|(name, item)| (shortened(name), item)))?);

@@ -158,6 +158,35 @@ fn lists_of_spheres_alone_are_read() {
 }
 
 #[test]
+fn trees_of_spheres_give_their_deepest_level() {
+    let read = |name: &str, text: &str| read_content(name, text.as_bytes(), ReadOptions::default());
+    let tree = "1 2\n0 0 0 2 1\n0 0 0 1 1\n2 0 0 1 1\n";
+    let loaded = read("tree.sph", tree).expect("two levels");
+    assert_eq!((loaded.mesh.spheres.len(), loaded.mesh.spheres[1].centre.x), (2, 2.0));
+    assert_eq!(loaded.notes, ["took the deepest of 2 levels"]);
+    // A child that is missing has no radius.
+    let missing = read("tree.sph", &tree.replace("2 0 0 1 1", "0 0 0 0 0")).expect("a child");
+    assert_eq!(missing.mesh.spheres.len(), 1);
+    let short = read("tree.sph", &tree.replace("2 0 0 1 1\n", "")).unwrap_err();
+    assert!(short.to_string().contains("2 rows are no whole levels"), "{short}");
+    let fields = read("tree.sph", &tree.replace("0 0 0 1 1", "0 0 0 1")).unwrap_err();
+    assert_eq!(fields.line, Some(3));
+    // Rows alone, as in clumps: the first of them is no header.
+    let rows = read("rows.sph", "0 0 0 1\n1 0 0 1\n").expect("rows");
+    assert_eq!(rows.mesh.spheres.len(), 2);
+}
+
+#[test]
+fn lists_of_centers_and_radii_are_read() {
+    let read = |text: &str| read_content("m.json", text.as_bytes(), ReadOptions::default());
+    let loaded = read(r#"{"centers": [[0, 0, 0], [1, 0, 0]], "radii": [1, 0.5]}"#).expect("two");
+    let radii: Vec<f64> = loaded.mesh.spheres.iter().map(|sphere| sphere.radius).collect();
+    assert_eq!(radii, [1.0, 0.5]);
+    let error = read(r#"{"centers": [[0, 0, 0], [1, 0, 0]], "radii": [1]}"#).unwrap_err();
+    assert!(error.to_string().contains("2 centers and 1 radii"), "{error}");
+}
+
+#[test]
 fn doubts_are_warnings() {
     for (text, expected) in [
         ("1 0 0\nv 0 0 0 1 2\n", "1 word behind 1 spheres: read as a type"),
