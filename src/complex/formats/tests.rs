@@ -167,11 +167,14 @@ fn trees_of_spheres_give_their_deepest_level() {
     // A child that is missing has no radius.
     let missing = read("tree.sph", &tree.replace("2 0 0 1 1", "0 0 0 0 0")).expect("a child");
     assert_eq!(missing.mesh.spheres.len(), 1);
-    let short = read("tree.sph", &tree.replace("2 0 0 1 1\n", "")).unwrap_err();
-    assert!(short.to_string().contains("2 rows are no whole levels"), "{short}");
+    let short = read("tree.sph", &(tree.to_owned() + "3 0 0 1 1\n")).unwrap_err();
+    assert!(short.to_string().contains("4 rows are no whole levels"), "{short}");
     let fields = read("tree.sph", &tree.replace("0 0 0 1 1", "0 0 0 1")).unwrap_err();
     assert_eq!(fields.line, Some(3));
-    // Rows alone, as in clumps: the first of them is no header.
+    // MATTopo's lists, whose header has the number of rows.
+    let list = read("list.sph", "4 2\n0 0 0 1 3\n1 0 0 1 3\n").expect("a list");
+    let is_tree = list.notes.iter().any(|note| note.contains("deepest"));
+    assert_eq!((list.mesh.spheres.len(), is_tree), (2, false));
     let rows = read("rows.sph", "0 0 0 1\n1 0 0 1\n").expect("rows");
     assert_eq!(rows.mesh.spheres.len(), 2);
 }
