@@ -40,7 +40,7 @@
 //! - The result depends on the samples, hence on the seed and on the orientation of the input; docs/tight.md
 //!   has figures.
 //! - The native level `error` is a bound of the two-sided error, a fraction of the diagonal, held by a
-//!   certificate. It takes two to three times as long as the number of spheres that is found.
+//!   certificate. It takes two to four times as long as the number of spheres that is found.
 //!
 //! # Starting from a given mesh
 //!
@@ -108,7 +108,7 @@ pub struct Tight {
 /// The `tight` simplifier, starting from the result of `starter`.
 ///
 /// Supports [`Level::Spheres`] up to a few thousand, at the cost of some hundred evaluations of all samples, and
-/// [`Level::Native`], a bound of the two-sided error, at two to three times that.
+/// [`Level::Native`], a bound of the two-sided error, at two to four times that.
 pub fn method(starter: impl MedialSimplifier + 'static) -> Tight {
     let info = MethodInfo::new("tight", "Tight")
         .seeded()
