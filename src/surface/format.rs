@@ -113,6 +113,13 @@ mod tests {
     }
 
     #[test]
+    fn a_byte_order_mark_is_no_part_of_an_stl_file() {
+        let facet = "facet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 endloop endfacet\n";
+        let text = format!("\u{feff}solid one\n{facet}endsolid one\n");
+        assert_eq!(stl::parse(text.as_bytes()).map(|soup| soup.len()), Ok(1));
+    }
+
+    #[test]
     fn layouts_of_the_same_tetrahedron_in_off() {
         let stream = TETRAHEDRON.replace('\n', " ");
         for text in [

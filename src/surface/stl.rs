@@ -40,6 +40,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
 }
 
 fn is_stl_text(bytes: &[u8]) -> bool {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let word = bytes.trim_ascii_start().get(..5);
     word.is_some_and(|word| word.eq_ignore_ascii_case(b"solid")) && !bytes.contains(&0)
 }
