@@ -171,6 +171,7 @@ fn at(solid: &Solid<'_>, base: &Base, level: Level) -> Result<Simplified> {
             solid.axis(&base.descent, angle)?
         }
     };
+    solid.check_memory(base.resolution, base.megabytes_with_output(&axis))?;
     let mesh = solid.medial_mesh(&axis)?;
     mesh.check()?;
     if axis.voxels.is_empty() {
@@ -205,7 +206,7 @@ const PUBLISHED_RESOLUTION: u32 = 369;
 const PUBLISHED_FLUX: f64 = 0.2;
 /// Object angle of the thinnest sheets of a number of spheres, in degrees.
 const OWN_ANGLE: f64 = 30.0;
-/// Memory for voxels, in megabytes. Finer lattices are refused.
+/// Memory for voxels and medial mesh, in megabytes. Finer lattices are refused.
 pub const MAX_MEGABYTES: f64 = 2000.0;
 
 /// Voxels along the longest side of the bounding box.

@@ -17,6 +17,10 @@
 //!    triangles (H. Edelsbrunner, J. Harer, *Computational Topology*, 2010, section VII.1), and these
 //!    are left out. Each of them lies on the boundary of a union of tetrahedra that does not contain
 //!    the ones before it. So no loop opens, and there is one void less.
+//!
+//! # Memory
+//! The triangles of thick sheets, and the tetrahedra that are checked for voids, far outnumber the
+//! voxels. So their memory is estimated before they are made.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -26,7 +30,7 @@ use medial::complex::{MedialMesh, Sphere as Ball};
 use medial::simplifier::RunContext;
 use rayon::prelude::*;
 
-use super::lattice::Voxel;
+use super::lattice::{LatticeVoxels, Voxel};
 use super::thinning::{CENTRE, offset, ones, squared, touch};
 use crate::Result;
 
@@ -232,4 +236,55 @@ fn without_common(a: &[(u8, u32)], b: &[(u8, u32)]) -> Vec<(u8, u32)> {
     sum.extend_from_slice(&a[i..]);
     sum.extend_from_slice(&b[j..]);
     sum
+}
+
+/// Bytes for each voxel of a result: its neighbours, its ball during the moves, its part of the result.
+const PER_VOXEL: f64 = 450.0;
+/// Bytes for each edge, triangle and tetrahedron, in vectors that grow.
+const PER_SIMPLEX: [f64; 3] = [16.0, 50.0, 40.0];
+
+/// Resident bytes for each byte in use: freed memory does not all return to the system.
+const RESIDENT: f64 = 1.75;
+
+/// Memory for the medial mesh of an axis next to other bytes, in megabytes.
+pub(super) fn megabytes(axis: &LatticeVoxels, other_bytes: f64) -> f64 {
+    let voxels = axis.bricks();
+    let mut numbers = [0_u64; 3];
+    for voxel in &axis.voxels {
+        let own = simplices(voxels.neighbourhood(voxel.place));
+        numbers.iter_mut().zip(own).for_each(|(all, own)| *all += u64::from(own));
+    }
+    let simplices = numbers.iter().zip(PER_SIMPLEX).map(|(&n, bytes)| n as f64 * bytes);
+    let output = axis.voxels.len() as f64 * PER_VOXEL + simplices.sum::<f64>();
+    RESIDENT * (output + other_bytes) / 1e6
+}
+
+/// Edges, triangles and tetrahedra of mutually adjacent voxels of which a voxel is the first.
+fn simplices(neighbourhood: u32) -> [u32; 3] {
+    let after = neighbourhood & AFTER_CENTRE;
+    let mut numbers = [after.count_ones(), 0, 0];
+    for b in ones(after) {
+        let with_b = after & TOUCHING_AFTER[b as usize];
+        numbers[1] += with_b.count_ones();
+        for c in ones(with_b) {
+            numbers[2] += (with_b & TOUCHING_AFTER[c as usize]).count_ones();
+        }
+    }
+    numbers
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn simplices_of_a_full_block_are_its_cliques() {
+        // A voxel with all its 26 neighbours: 13 come after it.
+        assert_eq!(simplices((1 << 27) - 1)[0], 13);
+        // The corner of a block of 2 x 2 x 2: all subsets of the seven others.
+        let block = (0..27).filter(|&bit| offset(bit).iter().all(|&x| x >= 0));
+        let block = block.fold(0, |bits, bit| bits | 1 << bit);
+        assert_eq!(simplices(block), [7, 21, 35]);
+        assert_eq!(simplices(1 << CENTRE), [0, 0, 0]);
+    }
 }

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::flux::{Sphere, Spiral, Surface};
 use super::lattice::{Descent, Grid, LatticeVoxels, Voxel, Wanted, betti, coarse_to_fine};
-use super::output::medial_mesh;
+use super::output::{medial_mesh, megabytes};
 use super::thinning::{FACES, Until, thin};
 use super::{LatticeSetting, MAX_RESOLUTION, PUBLISHED_RESOLUTION, Resolution, Rules, SAMPLES};
 use crate::Result;
@@ -142,6 +142,13 @@ impl TriedStart {
     fn difference(&self, expected: Option<[u64; 3]>) -> u64 {
         let expected = expected.unwrap_or(self.betti);
         self.betti.iter().zip(expected).map(|(&b, e)| b.abs_diff(e)).sum()
+    }
+}
+
+impl Base {
+    /// Memory for the voxels of this base and for the medial mesh of an axis, in megabytes.
+    pub(super) fn megabytes_with_output(&self, axis: &LatticeVoxels) -> f64 {
+        megabytes(axis, self.descent.tally.start as f64 * BYTES_PER_VOXEL)
     }
 }
 
@@ -347,7 +354,12 @@ impl Solid<'_> {
     /// Refuses lattices that have too many voxels along a side or do not fit into memory.
     fn check_resolution(&self, resolution: u32) -> Result<()> {
         within("resolution", resolution, 1..=MAX_RESOLUTION)?;
-        let (megabytes, limit) = (self.megabytes(resolution), self.setting.max_megabytes);
+        self.check_memory(resolution, self.megabytes(resolution))
+    }
+
+    /// Refuses a lattice that needs more megabytes than the limit.
+    pub(super) fn check_memory(&self, resolution: u32, megabytes: f64) -> Result<()> {
+        let limit = self.setting.max_megabytes;
         if megabytes <= limit {
             return Ok(());
         }
@@ -357,7 +369,8 @@ impl Solid<'_> {
         )))
     }
 
-    /// Memory for the voxels of a resolution, in megabytes.
+    /// Memory for the voxels of a resolution, in megabytes. That of the medial mesh is known when its
+    /// voxels are (`output.rs`).
     fn megabytes(&self, resolution: u32) -> f64 {
         let grid = self.grid(resolution);
         let voxels = self.volume / grid.side.powi(3);
@@ -381,8 +394,13 @@ impl Solid<'_> {
 
 // The published level: the paper's lattice, or the finest that fits.
 //
-// A resolution set by the user is not changed. Otherwise it is lowered until the voxels fit into memory. A
-// solid without a coarse voxel starts with fine ones.
+// A resolution set by the user is not changed. Otherwise it is lowered until the voxels and the medial
+// mesh fit into memory. A solid without a coarse voxel starts with fine ones.
+
+/// Limit of the times that the resolution is lowered for the medial mesh.
+const MAX_LOWERINGS: usize = 4;
+/// Memory that a lower resolution aims at, as a share of the limit.
+const AIMED_MEMORY: f64 = 0.95;
 
 /// The solid at the published level.
 ///
@@ -409,6 +427,18 @@ impl Solid<'_> {
         let has_coarse = self.descend(self.setting.resolution, Wanted::Places)?.tally.start > 0;
         self.setting.starts_coarse = has_coarse;
         let mut base = self.base()?;
+        for _ in 0..if is_free { MAX_LOWERINGS } else { 0 } {
+            let axis = self.axis(&base.descent, self.setting.angle)?;
+            let share = base.megabytes_with_output(&axis) / self.setting.max_megabytes;
+            if share <= 1.0 {
+                break;
+            }
+            // Voxels of sheets grow with the square of the resolution.
+            let resolution = self.setting.resolution;
+            let lower = f64::from(resolution) * (AIMED_MEMORY / share).sqrt();
+            self.setting.resolution = (lower as u32).clamp(1, (resolution - 1).max(1));
+            base = self.base()?;
+        }
         if self.setting.resolution != published {
             base.diagnostics.warn(format!(
                 "resolution {} instead of the published {published}: more does not fit into {} MB",
@@ -659,5 +689,12 @@ mod tests {
                 other => panic!("{other:?}"),
             }
         }
+        // The voxels fit, their medial mesh does not.
+        let setting = LatticeSetting { max_megabytes: 4.0, ..LatticeSetting::own(60) };
+        let solid = Solid::new(&shape, setting, RunContext::default()).expect("faces");
+        let base = solid.base().expect("fits");
+        let axis = solid.axis(&base.descent, 20.0).expect("not cancelled");
+        let needed = base.megabytes_with_output(&axis);
+        assert!(needed > 4.0 && solid.check_memory(60, needed).is_err());
     }
 }
