@@ -72,8 +72,10 @@ for record in frozen:
     if "native" in level:
         levels = native.setdefault(record["simplify"].get("variant") or record["simplify"]["method"], [])
         levels += [level["native"]] if level["native"] not in levels else []
-    kind = "builtin" if record.get("dataset") == "builtin" else "dataset"
-    sources[record["mesh"]] = (f"{kind}:{record['mesh']}", record["mesh_hash"])
+    # A built-in shape of another resolution is named box-8.
+    builtin = "builtin:" + re.sub(r"-(\d+)$", r":\1", record["mesh"])
+    source = builtin if record.get("dataset") == "builtin" else f"dataset:{record['mesh']}"
+    sources[record["mesh"]] = (source, record["mesh_hash"])
     for key in ("key", "command", "evaluate_seconds"):
         record.pop(key, None)
     record["repetitions"] = []

@@ -258,7 +258,7 @@ impl<'a> Boundary<'a> {
             }
         };
         let most = |best: Option<Peak>| best.map_or(f64::NEG_INFINITY, |best| best.distance);
-        // Lower bounds of all come first: the larger one is known, the earlier a search can end.
+        // Lower bounds of all come first: a search ends as soon as its upper bound is below the largest of them.
         let mut depths = Vec::new();
         for peak in &peaks {
             if peak.distance <= most(best) {

@@ -1,7 +1,7 @@
 //! Bodies of a closed surface that touch along edges, apart from each other.
 //!
-//! Where more than two faces meet in an edge, the surface does not say which of them belong together. A body that is inside
-//! out can be told from one that is not only if it is known as a body, so the faces are joined in pairs:
+//! Where more than two faces meet in an edge, the surface leaves open which of them belong together. The orientation of a
+//! body can be checked only by itself, so the faces are joined in pairs:
 //!
 //! 1. Faces that hang together over edges of two faces are a *patch*. In each, the fewer ones follow the others.
 //! 2. Every edge has to be passed as often in one direction as in the other: otherwise nothing says where the solid is.
@@ -11,6 +11,7 @@
 //! The result does not depend on the order of faces, but for coplanar ones at one edge that are not the same.
 
 use std::cmp::Ordering;
+use std::collections::HashSet;
 use std::ops::ControlFlow;
 
 use super::topology::{Topology, corner_at, ends, sides_by_edge, turn_over};
@@ -18,7 +19,7 @@ use crate::Vec3;
 use crate::geometry::predicates::{Sign, orient2d, orient3d, project, projection_axis};
 use crate::geometry::{DisjointSets, TriangleTree};
 
-/// A closed surface with vertices such that every edge has two faces.
+/// A closed surface with vertices for each part, so that every edge has two faces.
 pub(super) struct Parted {
     pub faces: Vec<[u32; 3]>,
     /// For each of its vertices the former one.
@@ -82,7 +83,11 @@ pub(super) fn parted(points: &[Vec3], faces: &[[u32; 3]]) -> Option<Parted> {
     Some(Parted { faces, vertices, turned })
 }
 
-/// Splits faces at vertices that lie on them, exactly, so that parts that touch there share them.
+/// Limit of the tests of a vertex against a face: a constant, and a number for each face.
+const MOST_TESTS: [usize; 2] = [5_000_000, 200];
+
+/// Splits faces at vertices that lie on them, exactly, so that parts that touch there share them. Faces that need more
+/// than [`MOST_TESTS`] stay whole.
 pub(super) fn split_at_vertices(points: &[Vec3], faces: &[[u32; 3]]) -> Vec<[u32; 3]> {
     let corners = |face: [u32; 3]| face.map(|v| points[v as usize]);
     let tree = TriangleTree::new(0..faces.len() as u32, |face| corners(faces[face as usize]));
@@ -90,9 +95,15 @@ pub(super) fn split_at_vertices(points: &[Vec3], faces: &[[u32; 3]]) -> Vec<[u32
     let mut used = faces.as_flattened().to_vec();
     used.sort_unstable();
     used.dedup();
+    let mut left = MOST_TESTS[0] + MOST_TESTS[1] * faces.len();
     for vertex in used {
         let p = points[vertex as usize];
         tree.overlapping([p; 3], |face, triangle| {
+            let tests = pieces[face as usize].len();
+            if left < tests {
+                return ControlFlow::Break(());
+            }
+            left -= tests;
             if !faces[face as usize].contains(&vertex) && holds(triangle, p) {
                 let pieces = &mut pieces[face as usize];
                 let split = std::mem::take(pieces).into_iter().flat_map(|[a, b, c]| {
@@ -195,15 +206,11 @@ impl Around<'_> {
 
     /// The half-edges that are joined, from their order around the edge.
     fn pairs(&self, sorted: &[u32]) -> Vec<[u32; 2]> {
-        let mut patches: Vec<u32> = sorted.iter().map(|&h| self.patch_of(h)).collect();
-        patches.sort_unstable();
-        patches.dedup();
-        let mut pairs = Vec::new();
-        for patch in patches {
-            let own = sorted.iter().copied().filter(|&h| self.patch_of(h) == patch);
-            pairs.extend(self.nested(&own.collect::<Vec<u32>>()));
-        }
-        let joined: &[u32] = pairs.as_flattened();
+        let mut by_patch = sorted.to_vec();
+        by_patch.sort_by_key(|&h| self.patch_of(h));
+        let patches = by_patch.chunk_by(|&g, &h| self.patch_of(g) == self.patch_of(h));
+        let mut pairs: Vec<[u32; 2]> = patches.flat_map(|own| self.nested(own)).collect();
+        let joined: HashSet<u32> = pairs.as_flattened().iter().copied().collect();
         let left: Vec<u32> = sorted.iter().copied().filter(|h| !joined.contains(h)).collect();
         pairs.extend(self.nested(&left));
         pairs
@@ -211,15 +218,16 @@ impl Around<'_> {
 
     /// Pairs with the solid between them, like brackets in a ring; those without a partner are left out.
     fn nested(&self, sorted: &[u32]) -> Vec<[u32; 2]> {
-        let mut pairs: Vec<[u32; 2]> = Vec::new();
-        let mut open = Vec::new();
-        // Twice around: the first faces may close what the last ones opened.
+        let (mut pairs, mut open) = (Vec::new(), Vec::new());
+        let mut is_closed = vec![false; sorted.len()];
+        // Twice around: the first faces may close a wedge that the last ones open.
         for (k, &h) in sorted.iter().chain(sorted).enumerate() {
+            let is_first = k < sorted.len();
+            let closed = &mut is_closed[k % sorted.len()];
             if self.opens(h) {
-                open.extend((k < sorted.len()).then_some(h));
-            } else if pairs.iter().all(|pair| pair[1] != h)
-                && let Some(other) = open.pop()
-            {
+                open.extend(is_first.then_some(h));
+            } else if !*closed && let Some(other) = open.pop() {
+                *closed = true;
                 pairs.push([other, h]);
             }
         }

@@ -249,7 +249,7 @@ fn closes_up(polygons: &PolygonSoup, sides: &[[u32; 2]], first: u32, second: u32
 }
 
 /// Renumbers the vertices that occur in faces, in their order; returns their former numbers.
-fn compact(vertices: usize, faces: &mut [[u32; 3]]) -> Vec<u32> {
+pub(super) fn compact(vertices: usize, faces: &mut [[u32; 3]]) -> Vec<u32> {
     let mut number = vec![u32::MAX; vertices];
     for &vertex in faces.as_flattened() {
         number[vertex as usize] = 0;

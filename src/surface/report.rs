@@ -279,7 +279,7 @@ pub enum Repair {
     DroppedUnreferencedVertices { vertices: usize },
     /// Faces that disagreed with their neighbours were turned over.
     ReorientedFaces { faces: usize },
-    /// Parts other than the largest were left out, on demand.
+    /// Parts were left out: those without volume, or on demand.
     DroppedComponents { components: usize, faces: usize },
     /// Parts that touched in a vertex or along an edge were drawn back from it.
     SeparatedVertices {

@@ -22,7 +22,7 @@ use super::intersections::intersections;
 use super::mend::separate;
 use super::mesh::{TriMesh, Unit};
 use super::parts::{Parted, parted, split_at_vertices};
-use super::repair::{Duplicates, Repaired, build, repair, weld_within};
+use super::repair::{Duplicates, Repaired, build, compact, repair, weld_within};
 use super::report::{Repair, SurfaceReport};
 use super::soup::PolygonSoup;
 use super::topology::{Topology, repairs, shells, turn_over};
@@ -35,7 +35,7 @@ const TOLERANCES: [f64; 5] = [0.0, 1e-12, 1e-9, 1e-7, 1e-6];
 /// Length below which edges of the result are contracted, as a fraction of the diagonal.
 const SHORT: f64 = 1e-5;
 
-/// Change of the volume by those contractions, as a share, above which they are left out.
+/// Change of the volume by contractions, as a share, above which they are left out.
 const SLIGHT: f64 = 1e-4;
 
 /// Change of the extent, and of the volume by a further pass, as shares, above which an arrangement is taken for wrong.
@@ -44,7 +44,7 @@ const LOSS: f64 = 1e-6;
 /// Limit of passes through the arrangement.
 const PASSES: usize = 4;
 
-/// Limit of the pairs of intersecting faces. The arrangement of 86,000 takes ten seconds, of 344,000 a minute.
+/// Limit of the pairs of intersecting faces. The time of the arrangement grows a little faster than their number.
 const MOST_PAIRS: usize = 100_000;
 
 /// The solid of a closed surface, whose triangles after exact welds are `checked`. None if it is open, or no pass gives a
@@ -164,7 +164,7 @@ fn closed(soup: &PolygonSoup, unit: Unit, diagonal: f64) -> Option<(Repaired, Op
 /// Faces oriented like their neighbours, and bodies outward, or inward where they are cavities; with the repairs. None for
 /// one-sided surfaces, which have no winding number.
 fn oriented(built: Repaired) -> Option<(TriMesh, Vec<Repair>)> {
-    let Repaired { vertices, mut faces, unit, points, .. } = built;
+    let Repaired { mut vertices, mut faces, unit, points, .. } = built;
     let mut repeated = 0;
     let Parted { faces: apart, vertices: of, turned } = parted(&points, &faces).or_else(|| {
         let all = faces.len();
@@ -192,6 +192,8 @@ fn oriented(built: Repaired) -> Option<(TriMesh, Vec<Repair>)> {
         let mut of_face = topology.component.iter();
         faces.retain(|_| of_face.next().is_some_and(|&c| !shells[c as usize].is_flat()));
         repairs.push(Repair::DroppedComponents { components, faces: all - faces.len() });
+        let kept = compact(vertices.len(), &mut faces);
+        vertices = kept.into_iter().map(|v| vertices[v as usize]).collect();
     }
     Some((TriMesh { vertices, faces }, repairs))
 }
@@ -210,8 +212,8 @@ fn drop_repeated(faces: &mut Vec<[u32; 3]>) {
 /// The boundary of the region with a winding number of at least 1. None if it does not reach as far as the surface.
 fn arranged(mesh: &TriMesh) -> Option<TriMesh> {
     let (low, high) = mesh.bounding_box()?;
-    // `manifold-rust` merges what is nearer than a share of the largest coordinate, and multiplies coordinates. The shift is
-    // exact: it is 0 but where all coordinates along an axis are within twice the least of them.
+    // `manifold-rust` merges vertices nearer than a share of the largest coordinate, and multiplies coordinates. The shift is
+    // exact: an axis is shifted only if its largest coordinate is at most twice the smallest.
     let is_far = |axis: usize| {
         let [near, far] = [low[axis], high[axis]];
         near * far > 0.0 && near.abs().min(far.abs()) >= 0.5 * near.abs().max(far.abs())

@@ -1,6 +1,7 @@
 //! From faces in any order and orientation to solids: orientation, cavities, invariants.
 
 use std::collections::HashSet;
+use std::f64::consts::TAU;
 
 use medial::Vec3;
 use medial::surface::{
@@ -177,6 +178,39 @@ fn thin_and_distant_plates_are_kept() {
         assert!((volume - expected).abs() < 1e-4 * expected, "{volume} for {expected}");
         assert_eq!(report.expected_betti, Some([1, 0, 0]));
     }
+}
+
+#[test]
+fn wedges_around_one_edge_are_bodies_each() {
+    let count = 40;
+    let wedge = |k: u32| {
+        let corner = |share: f64| {
+            let (sin, cos) = (TAU * (f64::from(k) + share) / f64::from(count)).sin_cos();
+            Vec3::new(cos, sin, 0.5)
+        };
+        let vertices = vec![Vec3::ZERO, Vec3::Z, corner(0.0), corner(0.5)];
+        let faces = vec![[0, 1, 3], [0, 2, 1], [0, 3, 2], [1, 2, 3]];
+        let wedge = TriMesh { vertices, faces };
+        if k.is_multiple_of(3) { inverted(wedge) } else { wedge }
+    };
+    let wedges: Vec<TriMesh> = (0..count).map(wedge).collect();
+    let report = read(&joined(&wedges)).report;
+    assert_eq!(report.expected_betti, Some([count as usize, 0, 0]));
+    let expected = f64::from(count) * (0.5 * TAU / f64::from(count)).sin() / 6.0;
+    let volume = report.volume.expect("closed");
+    assert!((volume - expected).abs() < 5e-3 * expected, "{volume} for {expected}");
+}
+
+#[test]
+fn bodies_without_volume_are_left_out_of_a_solid() {
+    let sheet = TriMesh {
+        vertices: vec![Vec3::splat(4.0), Vec3::new(5.0, 4.0, 4.0), Vec3::new(4.0, 5.0, 6.0)],
+        faces: vec![[0, 1, 2], [0, 2, 1]],
+    };
+    let other = cuboid(Vec3::splat(0.5), Vec3::splat(3.0));
+    let report = read(&joined(&[sheet, shell(1.0), other])).report;
+    assert!((report.volume.expect("closed") - (8.0 + 2.5_f64.powi(3) - 0.125)).abs() < 1e-12);
+    assert!(report.repairs.contains(&Repair::DroppedComponents { components: 1, faces: 2 }));
 }
 
 #[test]

@@ -59,7 +59,7 @@ use crate::surface::{InsideTest, Normalisation, Side, TriMesh, TriangleBvh};
 /// Limit of rounds of refinement.
 const ROUNDS: usize = 1_000;
 
-/// Patches are given up after this many times the points with which the fewest triangles were missing.
+/// Ratio of the number of points to that with the fewest missing triangles, above which patches are given up.
 const GROWTH: usize = 2;
 
 /// Limit of rounds against balls that reach far beyond the surface. Few shapes need ten.

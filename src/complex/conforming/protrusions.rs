@@ -73,7 +73,7 @@ impl Refinement {
         let way = FREE * ball.depth;
         let tip = ball.foot + way * outward;
         let nearest = surface.closest(tip);
-        // Behind an edge of the surface, beside the tip, the balls of both sides leave the edge as it is.
+        // A surface sideways of the tip, as behind an edge, bounds no gap.
         nearest.distance < 0.9 * way
             && outward.dot(nearest.point - tip).abs() > 0.5 * nearest.distance
     }

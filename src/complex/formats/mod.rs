@@ -4,7 +4,7 @@
 //! |---|---|---|---|
 //! | `.ma` | yes | yes | spheres, edges, faces: the interchange format of the field, in all its dialects |
 //! | `.ma_dup` | yes | no | the same |
-//! | `.sph` | yes | no | the same, lists of spheres alone, and trees of spheres, of which the deepest level is read |
+//! | `.sph` | yes | no | the same, lists of spheres, and the deepest level of a tree of spheres |
 //! | `.txt`, `.xyzr` | yes | rows `x y z r` | the same; written for granular simulations |
 //! | `.csv`, `.json`, `.yaml`, `.yml`, `.xrdf`, `.urdf`, `.xml` | yes | yes | spheres alone, of one link of a robot |
 //! | `.ply` | yes | text | the same, with a vertex property `radius`, for viewers |

@@ -390,15 +390,12 @@ pub(super) fn parse_tree(bytes: &[u8], name: &str, options: ReadOptions) -> Load
         spheres.push(Sphere::new(centre, number(radius, "radius")?));
     }
     let (mut above, mut level, mut levels) = (0, 1_usize, 1);
-    while above + level < spheres.len() {
+    while level > 0 && level < spheres.len() - above {
         above += level;
         level = level.saturating_mul(children);
         levels += 1;
-        if level == 0 {
-            break;
-        }
     }
-    if above + level != spheres.len() {
+    if level != spheres.len() - above {
         let why = format!("{} rows are no whole levels with {children} children", spheres.len());
         return Err(malformed(name, None, why));
     }
@@ -567,7 +564,7 @@ fn named(map: &Map<String, Value>, key: &str, links: &mut Vec<Link>) -> Result<(
         }
         let of_each = centres.iter().zip(radii);
         let items = of_each.map(|(centre, radius)| json!({ "center": centre, "radius": radius }));
-        return collect(&Value::Array(items.collect()), key, links);
+        collect(&Value::Array(items.collect()), key, links)?;
     }
     if map.values().any(|item| has_centre(item) && has_radius(item) && !is_other_shape(item)) {
         let alike = map.iter().filter(|(_, item)| has_centre(item) || has_radius(item));

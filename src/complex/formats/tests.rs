@@ -169,6 +169,11 @@ fn trees_of_spheres_give_their_deepest_level() {
     assert_eq!(missing.mesh.spheres.len(), 1);
     let short = read("tree.sph", &(tree.to_owned() + "3 0 0 1 1\n")).unwrap_err();
     assert!(short.to_string().contains("4 rows are no whole levels"), "{short}");
+    for children in ["0", "18446744073709551615"] {
+        let text = tree.replace("1 2\n", &format!("7 {children}\n"));
+        let error = read("tree.sph", &text).unwrap_err().to_string();
+        assert!(error.contains("no whole levels"), "{error}");
+    }
     let fields = read("tree.sph", &tree.replace("0 0 0 1 1", "0 0 0 1")).unwrap_err();
     assert_eq!(fields.line, Some(3));
     // MATTopo's lists, whose header has the number of rows.
@@ -187,6 +192,11 @@ fn lists_of_centers_and_radii_are_read() {
     assert_eq!(radii, [1.0, 0.5]);
     let error = read(r#"{"centers": [[0, 0, 0], [1, 0, 0]], "radii": [1]}"#).unwrap_err();
     assert!(error.to_string().contains("2 centers and 1 radii"), "{error}");
+    // Lists next to them are not lost.
+    let both =
+        r#"{"centers": [[0, 0, 0]], "radii": [1], "arm": [{"center": [1, 0, 0], "radius": 1}]}"#;
+    let error = read(both).unwrap_err().to_string();
+    assert!(error.contains("2 links"), "{error}");
 }
 
 #[test]

@@ -11,7 +11,7 @@ use crate::geometry::trees::Bounds;
 /// Rounding error of a projection, as a fraction of the length of the axis times that of the vector.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
-/// A tetrahedron with the axes of its own.
+/// A tetrahedron with its separating axes.
 pub(super) struct Tetrahedron {
     /// Origin of the relative coordinates.
     origin: Vec3,
