@@ -28,8 +28,11 @@ pub(super) struct Parted {
     pub turned: Vec<bool>,
 }
 
-/// The parts of a closed surface. None where it is one-sided, where the directions at an edge do not match, or one of its
-/// faces there has no area.
+/// Limit of the faces at one edge, all of which touch each other.
+const MOST_FACES: usize = 1_000;
+
+/// The parts of a closed surface. None where it is one-sided, where the directions at an edge do not match, one of its
+/// faces there has no area, or they are more than [`MOST_FACES`].
 pub(super) fn parted(points: &[Vec3], faces: &[[u32; 3]]) -> Option<Parted> {
     let mut turned = Topology::new(points.len(), faces).turns(faces).ok()?;
     let mut patches = DisjointSets::singletons(faces.len());
@@ -57,7 +60,7 @@ pub(super) fn parted(points: &[Vec3], faces: &[[u32; 3]]) -> Option<Parted> {
         let around = Around { points, faces: &faces, patch: &patch, edge };
         let half_edges: Vec<u32> = group.iter().map(|&(.., h)| h).collect();
         let opening = half_edges.iter().filter(|&&h| around.opens(h)).count();
-        if 2 * opening != half_edges.len() {
+        if 2 * opening != half_edges.len() || half_edges.len() > MOST_FACES {
             return None;
         }
         let pairs = match half_edges[..] {

@@ -74,9 +74,18 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
     // A weld may have been all that was missing.
     let welded = examined(&mesh)?;
     if is_solid(&welded) {
-        let Inspection { mesh, mut report, .. } = welded;
-        report.repairs = repairs;
-        return Some(Loaded { mesh, report });
+        return Some(loaded(welded, repairs));
+    }
+    let is_wall = |repair: &Repair| matches!(repair, Repair::DroppedDuplicateFaces { .. });
+    if !welded.report.self_intersecting && !welded.report.repairs.iter().any(is_wall) {
+        // Parts touch in common vertices and edges alone: nothing has to be arranged.
+        let TriMesh { mut vertices, mut faces } = mesh.clone();
+        let separated = separate(&mut vertices, &mut faces);
+        let found = examined(&TriMesh { vertices, faces })?;
+        if is_solid(&found) {
+            repairs.extend(separated);
+            return Some(loaded(found, repairs));
+        }
     }
     for pass in 0..PASSES {
         let mut edges = 0;
@@ -106,17 +115,21 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
             }
         }
         if is_solid(&found) {
-            let Inspection { mesh, mut report, .. } = found;
-            repairs.push(Repair::ResolvedFaces { faces: replaced, by: mesh.faces.len() });
+            repairs.push(Repair::ResolvedFaces { faces: replaced, by: found.mesh.faces.len() });
             repairs.extend(separated);
             let distance = SHORT * diagonal;
             repairs.extend((edges > 0).then_some(Repair::ContractedEdges { edges, distance }));
-            report.repairs = repairs;
-            return Some(Loaded { mesh, report });
+            return Some(loaded(found, repairs));
         }
         mesh = found.mesh;
     }
     None
+}
+
+/// An examined solid after all repairs.
+fn loaded(Inspection { mesh, mut report, .. }: Inspection, repairs: Vec<Repair>) -> Loaded {
+    report.repairs = repairs;
+    Loaded { mesh, report }
 }
 
 /// The vertices and faces of a mesh whose parts share a vertex wherever one touches another with a vertex.
@@ -175,6 +188,10 @@ fn oriented(built: Repaired) -> Option<(TriMesh, Vec<Repair>)> {
     let points: Vec<Vec3> = of.iter().map(|&v| points[v as usize]).collect();
     let topology = Topology::new(points.len(), &apart);
     let found = intersections(&points, &apart, &topology.component);
+    if !found.complete {
+        // Without all pairs that touch, nesting is unknown.
+        return None;
+    }
     let shells = shells(unit, &points, &apart, &topology, &found).ok()?;
     let is_wrong = shells.iter().map(|shell| {
         // One that touches another from inside may be a pocket or a body in it: its orientation decides.

@@ -196,6 +196,8 @@ fn wedges_around_one_edge_are_bodies_each() {
     let wedges: Vec<TriMesh> = (0..count).map(wedge).collect();
     let report = read(&joined(&wedges)).report;
     assert_eq!(report.expected_betti, Some([count as usize, 0, 0]));
+    // Nothing crosses, so no face is replaced.
+    assert_eq!(report.faces, 4 * count as usize);
     let expected = f64::from(count) * (0.5 * TAU / f64::from(count)).sin() / 6.0;
     let volume = report.volume.expect("closed");
     assert!((volume - expected).abs() < 5e-3 * expected, "{volume} for {expected}");
