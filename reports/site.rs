@@ -57,7 +57,8 @@ pub fn write_site(
     Ok([report, files.written].concat())
 }
 
-const SUBMISSIONS: &str = "https://github.com/medial-rs/medial/blob/main/docs/submit.md";
+const SUBMISSIONS: &str =
+    "https://github.com/medial-rs/medial/blob/main/docs/external.md#handing-in-results";
 
 fn mesh_file(stem: &str) -> String {
     format!("mesh-{stem}.html")

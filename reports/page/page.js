@@ -248,7 +248,7 @@ const start = async () => {
   const named = [...main.querySelectorAll(":scope > section > h2, #more > details.fold > summary")];
   document.querySelector("nav").append(...named.map((head) =>
     make("a", { href: `#${head.parentElement.id}` }, head.textContent)));
-  if (report.site) document.querySelector("nav").append(make("a", { href: "https://github.com/medial-rs/medial/blob/main/docs/submit.md" }, "Hand in results"));
+  if (report.site) document.querySelector("nav").append(make("a", { href: "https://github.com/medial-rs/medial/blob/main/docs/external.md#handing-in-results" }, "Hand in results"));
   openTarget();
   document.documentElement.dataset.ready = "";
   // Pictures from files move what is below them.
