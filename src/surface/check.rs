@@ -24,7 +24,11 @@ pub(super) fn orient_and_examine(repaired: Repaired) -> Inspection {
     let names = Some(&file_vertex[..]);
     let evidence = Evidence { mesh: &mesh, topology: &topology, unit, points, found, names };
     let one_sided = turns.as_ref().err().map(|&face| Fault::NonOrientable { face: face as usize });
-    let mut fault = evidence.structural_fault().or(one_sided);
+    let mut fault = match (evidence.structural_fault(), one_sided) {
+        // No filling closes a one-sided surface.
+        (Some(Fault::Open { .. }), Some(one_sided)) => Some(one_sided),
+        (fault, one_sided) => fault.or(one_sided),
+    };
     let mut report = evidence.measure();
     report.oriented = turns.is_ok();
     report.warnings.splice(0..0, warnings);

@@ -53,6 +53,11 @@ impl fmt::Display for Format {
 
 /// Parses the content of a file that may have no face.
 pub(super) fn parse_points(bytes: &[u8], format: Format) -> Result<PolygonSoup, Fault> {
+    // Line ends and digits of UTF-16 hold a zero byte each.
+    if let [0xff, 0xfe, _, 0, ..] | [0xfe, 0xff, 0, ..] = bytes {
+        let why = "text in UTF-16 is not read; write the file in UTF-8 or ASCII";
+        return Err(Fault::Unsupported(why.into()));
+    }
     match format {
         Format::Off => off::parse(bytes),
         Format::Obj => obj::parse(bytes),
@@ -141,8 +146,20 @@ mod tests {
             assert_eq!((soup.vertices.len(), soup.len()), (4, 4), "{text:?}");
             assert_eq!((soup.polygon(3), soup.vertices[3]), (&[1, 2, 3][..], Vec3::Z), "{text:?}");
         }
-        let trailing = off::parse(format!("OFF\n4 4 6\n{TETRAHEDRON}\nthe end\n").as_bytes());
-        assert_eq!(trailing.unwrap().warnings.len(), 1);
+        let colours = TETRAHEDRON.replace("0 0 1\n", "0 0 1 255 0 0\n");
+        for (text, warning) in [
+            (
+                format!("{TETRAHEDRON}\nthe end\n"),
+                "line 12: text after the last face (line 10) is ignored",
+            ),
+            (colours, "numbers after the coordinates of vertices are ignored"),
+        ] {
+            let soup = off::parse(format!("OFF\n4 4 6\n{text}").as_bytes()).unwrap();
+            assert_eq!(
+                (soup.vertices[3], &soup.warnings[..]),
+                (Vec3::Z, &[warning.to_owned()][..])
+            );
+        }
     }
 
     #[test]
@@ -173,6 +190,7 @@ mod tests {
         for text in [
             format!("solid a b\n{FACET}{FACET}endsolid a b\n"),
             format!("SOLID\n{}endsolid\nsolid\n{FACET}endsolid", FACET.to_uppercase()),
+            format!("solid\n{FACET}{FACET}endsolid\n").replace("end", "end "),
         ] {
             assert_eq!(stl::parse(text.as_bytes()).unwrap().len(), 2, "{text}");
         }
@@ -180,8 +198,12 @@ mod tests {
             let soup = stl::parse(&binary_stl(name, 2, 2)).unwrap();
             assert_eq!((soup.len(), soup.vertices.len(), soup.vertices[4].x), (2, 6, 1.0));
         }
+        let mut trailing = binary_stl("x", 2, 2);
+        trailing.extend(b"the end");
+        let soup = stl::parse(&trailing).unwrap();
+        assert_eq!((soup.len(), &*soup.warnings[0]), (2, "7 bytes after 2 triangles ignored"));
         for (name, announced, triangles, holds) in
-            [("solid", 1000, 1, 50), ("x", 1, 2, 100), ("x", u32::MAX, 0, 0)]
+            [("solid", 1000, 1, 50), ("x", 1, 2, 100), ("x", 0, 1, 50), ("x", u32::MAX, 0, 0)]
         {
             let error = stl::parse(&binary_stl(name, announced, triangles)).unwrap_err();
             let expected = format!(
@@ -207,7 +229,7 @@ mod tests {
         assert_eq!(ply::parse(&file).unwrap().polygon(0), [0, 1, 2]);
         let message = |bytes: &[u8]| ply::parse(bytes).unwrap_err().to_string();
         let cut = message(&file[..file.len() - 1]);
-        assert!(cut.starts_with("face 0: expected face 0, found "), "{cut}");
+        assert_eq!(cut, "end of file: expected face 0 of 1, found nothing more");
         let last = file.len() - 1;
         file[last] = 9;
         assert_eq!(message(&file), "face 0 names the vertex 9 of 3 vertices");
@@ -249,6 +271,8 @@ OFF => end of file: expected the number of vertices, found nothing more
 ply\n => line 1: expected the keyword OFF, found "ply"
 OFF\n1 -1 0\n0 0 0\n => line 2: expected the number of faces, found "-1"
 OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n => line 6: expected 3 vertices of face 0, got 2, found the end of the line
+OFF\n3 1 0\n0 0 0 1\n1 0 0\n0 1 0\n3 0 1 2\n => line 3: expected the end of the line (other numbers than a colour need a prefix of OFF), found "1"
+OFF\n3 1 0\n0 0 0\n1,5 0 0\n0 1 0\n3 0 1 2\n => line 4: expected 3 coordinates of vertex 1 of 3, found "1,5", a decimal comma
 OFF\n3 1 0\n0 0 0\n1 x 0\n0 1 0\n3 0 1 2\n => line 4: expected 3 coordinates of vertex 1 of 3, found "x"
 OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n => line 6: face 0 names the vertex 3 of 3 vertices
 OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n => line 6: face 0 has 2 corners; three are the least
@@ -291,6 +315,16 @@ element face => element tristrips => PLY triangle strips are not read;
 1 0 0\n => 1 0 0..\n => line 11: expected vertex 1, found "0.."
 3 0 1 2\n =>  => end of file: expected face 0, found nothing more
 vertex 3 => vertex 99 => the header announces 99 vertices, but the file holds only 28"#;
+
+    #[test]
+    fn text_in_utf_16_is_named() {
+        for big in [false, true] {
+            let bytes = |unit: u16| if big { unit.to_be_bytes() } else { unit.to_le_bytes() };
+            let text: Vec<u8> = "\u{feff}OFF\n".encode_utf16().flat_map(bytes).collect();
+            let error = parse(&text, Format::Off).unwrap_err().to_string();
+            assert_eq!(error, "text in UTF-16 is not read; write the file in UTF-8 or ASCII");
+        }
+    }
 
     #[test]
     fn errors_name_the_line() {

@@ -230,7 +230,30 @@ fn inspected(mut soup: soup::PolygonSoup) -> Result<Inspection, Fault> {
             inspection.report.warnings.push(why.to_owned());
         }
     }
+    if let Some((spacing, diagonal)) = lost_digits(&inspection.mesh) {
+        let Inspection { report, refused, resolved, .. } = &mut inspection;
+        let warning = report::lost_digits(spacing, diagonal);
+        if let Some(error) = refused {
+            let fault = Box::new(error.fault.clone());
+            error.fault = Fault::LostDigits { spacing, diagonal, fault };
+        }
+        let resolved = resolved.iter_mut().map(|solid| &mut solid.report);
+        resolved.chain([report]).for_each(|report| report.warnings.push(warning.clone()));
+    }
     Ok(inspection)
+}
+
+/// The distance of neighbouring numbers in single precision at the largest coordinate, and the diagonal of the bounding
+/// box, where all coordinates are such numbers and the distance is a large share of the diagonal.
+fn lost_digits(mesh: &TriMesh) -> Option<(f64, f64)> {
+    /// Share of the diagonal that counts as large.
+    const LARGE: f64 = 1e-5;
+    let mut coordinates = mesh.vertices.iter().flat_map(|vertex| vertex.to_array());
+    let largest = coordinates.clone().fold(0.0_f64, |largest, x| largest.max(x.abs())) as f32;
+    let spacing = f64::from(largest.next_up()) - f64::from(largest);
+    let diagonal = Normalisation::of(mesh)?.diagonal;
+    let is_large = spacing.is_finite() && spacing > LARGE * diagonal;
+    (is_large && coordinates.all(|x| f64::from(x as f32) == x)).then_some((spacing, diagonal))
 }
 
 fn in_file(path: &Path, fault: Fault) -> SurfaceError {

@@ -114,6 +114,7 @@ fn parse_vertices(
         return Err(Fault::Count { what, announced, holds });
     }
     soup.vertices.reserve_exact(header.vertices);
+    let mut is_ignored = false;
     for vertex in 0..header.vertices {
         let mut xyz = [0.0; 3];
         if by_line {
@@ -126,32 +127,43 @@ fn parse_vertices(
         let line = cursor.line;
         soup.push_vertex(xyz, || Place::Line(line))?;
         if by_line {
-            finish_vertex_line(cursor, header, extra)?;
+            is_ignored |= finish_vertex_line(cursor, header, extra)?;
         } else {
             for _ in 0..extra {
                 cursor.number::<f64>("a normal or texture coordinate")?;
             }
         }
     }
+    if is_ignored {
+        soup.warnings.push("numbers after the coordinates of vertices are ignored".to_owned());
+    }
     Ok(())
 }
 
-/// Passes over normal, colour and texture coordinates. The number of colour components is free.
+/// Passes over normal, colour and texture coordinates. The number of colour components is free. Returns whether the line
+/// has a colour or normal that the header does not announce.
 fn finish_vertex_line(
     cursor: &mut Cursor<'_>,
     header: &OffHeader,
     extra: usize,
-) -> Result<(), Fault> {
+) -> Result<bool, Fault> {
     for _ in 0..extra {
         cursor.number_on_line::<f64>("a normal or texture coordinate")?;
     }
     let more = cursor.token_on_line();
-    if more.is_some() && !header.colours {
-        let expected = "the end of the line (colours and normals need COFF and NOFF)";
-        return Err(cursor.expected(expected, more));
+    let is_ignored = more.is_some() && !header.colours;
+    if is_ignored {
+        let mut line = cursor.clone();
+        let rest: Vec<_> = std::iter::from_fn(|| line.token_on_line()).chain(more).collect();
+        // Red, green, blue, with or without a fourth component; or a normal.
+        let is_colour = rest.len() == 3 || rest.len() == 4;
+        if !is_colour || rest.iter().any(|token| token.parse::<f64>().is_none()) {
+            let expected = "the end of the line (other numbers than a colour need a prefix of OFF)";
+            return Err(cursor.expected(expected, more));
+        }
     }
     cursor.next_line();
-    Ok(())
+    Ok(is_ignored)
 }
 
 fn parse_faces(

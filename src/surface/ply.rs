@@ -223,8 +223,10 @@ impl Ply<'_> {
                     Encoding::BinaryBigEndian => parser.read_big_endian_element(&mut rest, element),
                     _ => parser.read_little_endian_element(&mut rest, element),
                 };
-                let values = values
-                    .map_err(|error| fault(place.clone(), &format!("{name} {row}"), &error))?;
+                let values = values.map_err(|error| {
+                    let what = format!("{name} {row} of {}", element.count);
+                    fault(place.clone(), &what, &error)
+                })?;
                 take(name, row, &place, values)?;
             }
         }
@@ -268,6 +270,10 @@ fn text_row(
 fn fault(at: Place, expected: &str, error: &ParseError) -> Fault {
     const MOST: usize = 80;
     let text = error.to_string();
+    if text.ends_with("failed to fill whole buffer") {
+        let (expected, found) = (expected.to_owned(), "nothing more".to_owned());
+        return Fault::Syntax { at: Place::End, expected, found };
+    }
     let text = text.split_once(": ").filter(|_| text.starts_with("Line ")).map_or(&*text, |t| t.1);
     let parts: Vec<&str> = text.splitn(3, "\n\t").take(2).map(str::trim).collect();
     let found = parser_message(&parts.join(" ")).chars().take(MOST).collect();

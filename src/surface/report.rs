@@ -33,6 +33,15 @@ pub(super) fn counted(number: usize, noun: &str) -> String {
     }
 }
 
+/// A remark on coordinates in single precision with a spacing.
+pub(super) fn lost_digits(spacing: f64, diagonal: f64) -> String {
+    let percent = 100.0 * spacing / diagonal;
+    format!(
+        "the coordinates are numbers in single precision, which lie {spacing} apart so far from the origin \
+         ({percent:.1e} % of the diagonal), so that digits are lost; move the surface to the origin before it is written"
+    )
+}
+
 /// Where in a file something is wrong.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
@@ -171,10 +180,13 @@ pub enum Fault {
     /// A component whose two sides coincide.
     #[error(
         "the component of face {face} ({}) encloses no volume; \
-         leave it out (`medial repair --components largest`) or give it thickness",
+         give it thickness, or wrap it (`medial repair --wrap`)",
         counted(*.faces, "face")
     )]
     ZeroVolume { face: usize, faces: usize },
+    /// Another fault, of a surface far from the origin in single precision.
+    #[error("{fault}; {}", lost_digits(*.spacing, *.diagonal))]
+    LostDigits { spacing: f64, diagonal: f64, fault: Box<Fault> },
     /// Only from [`crate::surface::Inspection::as_is`]: faces that cross.
     #[error("{}; without `--as-is` the solid that they mean is used", match pairs { 1 => "1 pair of faces crosses".to_owned(), _ => format!("{pairs} pairs of faces cross") })]
     Crossing { pairs: usize },

@@ -2,9 +2,9 @@
 //! with any first words. The crate `stl_io` takes a binary file that begins with `solid` for text, and reads
 //! text in single precision.
 
-use super::report::{Fault, Place};
+use super::report::{Fault, Place, counted};
 use super::soup::PolygonSoup;
-use super::text::{Cursor, quote};
+use super::text::{Cursor, Token, quote};
 
 const STL_HEADER: usize = 84;
 const STL_TRIANGLE: usize = 50;
@@ -17,17 +17,26 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
     else {
         return parse_stl_text(bytes);
     };
+    let mut soup = PolygonSoup::default();
     // Many binary files begin with `solid`, so the size decides.
     if announced.checked_mul(STL_TRIANGLE) != Some(triangles.len()) {
         if is_stl_text(bytes) {
             return parse_stl_text(bytes);
         }
-        let rest = triangles.len();
-        let holds = format!("{rest} bytes after its header, {STL_TRIANGLE} for each triangle");
-        return Err(Fault::Count { what: "triangles", announced: announced as u64, holds });
+        let rest =
+            announced.checked_mul(STL_TRIANGLE).and_then(|all| triangles.len().checked_sub(all));
+        // A remainder of whole triangles means that the count is wrong.
+        let Some(rest) = rest.filter(|rest| announced > 0 && rest % STL_TRIANGLE != 0) else {
+            let holds = format!(
+                "{} bytes after its header, {STL_TRIANGLE} for each triangle",
+                triangles.len()
+            );
+            return Err(Fault::Count { what: "triangles", announced: announced as u64, holds });
+        };
+        let behind = counted(announced, "triangle");
+        soup.warnings.push(format!("{} after {behind} ignored", counted(rest, "byte")));
     }
-    let mut soup = PolygonSoup::default();
-    for (face, triangle) in triangles.chunks_exact(STL_TRIANGLE).enumerate() {
+    for (face, triangle) in triangles.chunks_exact(STL_TRIANGLE).take(announced).enumerate() {
         // Behind the normal; attribute bytes follow.
         let (numbers, _) = triangle[12..48].as_chunks();
         for corner in numbers.chunks_exact(3) {
@@ -71,10 +80,12 @@ fn parse_stl_text(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
                 let xyz = cursor.position_on_line("3 coordinates after vertex")?;
                 soup.push_corner(xyz, || Place::Line(cursor.line))?;
             }
-            keyword(&mut cursor, "endloop")?;
-            keyword(&mut cursor, "endfacet")?;
+            end_of(&mut cursor, "loop")?;
+            end_of(&mut cursor, "facet")?;
             soup.end_polygon(Some(line))?;
-        } else if token.is(if is_inside { "endsolid" } else { "solid" }) {
+        } else if token.is("solid") != is_inside
+            && (token.is("solid") || ends(&mut cursor, token, "solid"))
+        {
             is_inside = !is_inside;
             cursor.next_line();
         } else {
@@ -88,4 +99,24 @@ fn parse_stl_text(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
 fn keyword(cursor: &mut Cursor<'_>, word: &str) -> Result<(), Fault> {
     let token = cursor.token();
     if token.is_some_and(|t| t.is(word)) { Ok(()) } else { Err(cursor.expected(word, token)) }
+}
+
+/// Whether a token, with the next one of the line where it is `end` alone, ends a block: some programs write `end loop`.
+fn ends(cursor: &mut Cursor<'_>, token: Token<'_>, block: &str) -> bool {
+    let [first, rest] = token.text.split_at_checked(3).map_or([token.text, b""], |(a, b)| [a, b]);
+    if !first.eq_ignore_ascii_case(b"end") {
+        return false;
+    }
+    match rest {
+        [] => cursor.token_on_line().is_some_and(|next| next.is(block)),
+        rest => rest.eq_ignore_ascii_case(block.as_bytes()),
+    }
+}
+
+fn end_of(cursor: &mut Cursor<'_>, block: &str) -> Result<(), Fault> {
+    let token = cursor.token();
+    match token {
+        Some(token) if ends(cursor, token, block) => Ok(()),
+        _ => Err(cursor.expected(format_args!("end{block}"), token)),
+    }
 }

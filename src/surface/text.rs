@@ -157,7 +157,10 @@ impl<'a> Cursor<'a> {
     /// A fault: another text, or none, in place of the expected one.
     pub fn expected(&self, expected: impl fmt::Display, found: Option<Token<'_>>) -> Fault {
         let (at, found) = match found {
-            Some(token) => (Place::Line(token.line), quote(token.text)),
+            Some(token) => {
+                let advice = if token.is_decimal_comma() { ", a decimal comma" } else { "" };
+                (Place::Line(token.line), quote(token.text) + advice)
+            }
             None if self.at >= self.bytes.len() => (Place::End, "nothing more".to_owned()),
             None => (Place::Line(self.line), "the end of the line".to_owned()),
         };
@@ -188,6 +191,12 @@ impl Token<'_> {
     /// The token as a number; `nan` and `inf` are floating-point numbers here.
     pub fn parse<T: FromStr>(&self) -> Option<T> {
         std::str::from_utf8(self.text).ok()?.parse().ok()
+    }
+
+    /// Whether the token is a number whose decimals follow a comma.
+    fn is_decimal_comma(&self) -> bool {
+        let text = String::from_utf8_lossy(self.text);
+        text.contains(',') && text.replacen(',', ".", 1).parse::<f64>().is_ok()
     }
 
     /// Whether the token is this word, in upper or lower case.

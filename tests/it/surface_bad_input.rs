@@ -146,6 +146,34 @@ fn surfaces_that_bound_no_solid_are_refused() {
         })
         .collect();
     assert!(matches!(fault(&to_off(&bottle)), Fault::NonOrientable { .. }));
+    let strip = |i: u32, j: u32| if i < n { 2 * i + j } else { 1 - j };
+    let mut moebius = torus(n, 2);
+    moebius.faces = (0..n)
+        .flat_map(|i| [[(i, 0), (i + 1, 0), (i + 1, 1)], [(i, 0), (i + 1, 1), (i, 1)]])
+        .map(|corners| corners.map(|(i, j)| strip(i, j)))
+        .collect();
+    assert!(matches!(fault(&to_off(&moebius)), Fault::NonOrientable { .. }));
+}
+
+#[test]
+fn digits_lost_far_from_the_origin_in_single_precision_are_named() {
+    let single = |v: Vec3| Vec3::from_array(v.to_array().map(|x| f64::from(x as f32)));
+    let mut torus = torus(40, 20);
+    let named = |mesh: &surface::TriMesh, shift: f64| {
+        let far = to_off(&moved(mesh.clone(), |v| single(v + shift)));
+        let found = surface::inspect_bytes("torus.off", far.as_bytes()).unwrap();
+        let warnings = found.report.warnings.iter();
+        (warnings.filter(|warning| warning.contains("digits are lost")).count(), found.solid())
+    };
+    assert_eq!(named(&torus, 1.0).0, 0);
+    let (count, solid) = named(&torus, 1e4);
+    assert_eq!((count, solid.unwrap().report.warnings.len()), (1, 1));
+    // The same distances in double precision lose nothing that matters.
+    let far = to_off(&moved(torus.clone(), |v| v + 1e7 / 3.0));
+    assert_eq!(read(far.as_bytes(), Format::Off).unwrap().report.warnings, [""; 0]);
+    torus.faces.pop();
+    let Fault::LostDigits { fault, .. } = named(&torus, 1e4).1.unwrap_err().fault else { panic!() };
+    assert!(matches!(*fault, Fault::Open { edges: 3, .. }));
 }
 
 #[test]
