@@ -11,7 +11,7 @@
 //! The result does not depend on the order of faces, but for coplanar ones at one edge that are not the same.
 
 use std::cmp::Ordering;
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::ops::ControlFlow;
 
 use super::topology::{Topology, corner_at, ends, sides_by_edge, turn_over};
@@ -31,27 +31,112 @@ pub(super) struct Parted {
 /// Limit of the faces at one edge, all of which touch each other.
 const MOST_FACES: usize = 1_000;
 
+/// Faces that hang together over edges of two faces.
+struct Patches {
+    /// All faces, those of a patch oriented alike.
+    faces: Vec<[u32; 3]>,
+    /// The patch of each face.
+    of: Vec<u32>,
+    /// Whether a face was turned over.
+    turned: Vec<bool>,
+}
+
+impl Patches {
+    /// None where a patch is one-sided.
+    fn new(vertices: usize, faces: &[[u32; 3]]) -> Option<Self> {
+        let mut turned = Topology::new(vertices, faces).turns(faces).ok()?;
+        let mut patches = DisjointSets::singletons(faces.len());
+        for group in sides_by_edge(faces).chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)) {
+            if let &[(.., g), (.., h)] = group {
+                patches.join(g / 3, h / 3);
+            }
+        }
+        let of: Vec<u32> = (0..faces.len() as u32).map(|face| patches.find(face)).collect();
+        let mut balance = vec![0; faces.len()];
+        for (&patch, &turned) in of.iter().zip(&turned) {
+            balance[patch as usize] += if turned { 1 } else { -1 };
+        }
+        for (&patch, turned) in of.iter().zip(&mut turned) {
+            *turned ^= balance[patch as usize] > 0;
+        }
+        let mut faces = faces.to_vec();
+        turn_over(&mut faces, turned.iter().copied());
+        Some(Self { faces, of, turned })
+    }
+}
+
+/// The faces of plane walls between bodies, no two of which are farther apart than `most`, and their largest distance.
+///
+/// A wall is a pair of patches of opposite orientation with the same border, where other faces close the surface without
+/// them. Cut into triangles in two ways, and rounded, they enclose slivers that no one means.
+pub(super) fn walls(points: &[Vec3], faces: &[[u32; 3]], most: f64) -> (Vec<bool>, f64) {
+    let mut is_wall = vec![false; faces.len()];
+    let mut distance = 0.0_f64;
+    let Some(Patches { faces, of, .. }) = Patches::new(points.len(), faces) else {
+        return (is_wall, distance);
+    };
+    // For each patch its border: numbers of edges, and whether it runs up them.
+    let mut borders = BTreeMap::<u32, Vec<(u32, bool)>>::new();
+    let sides = sides_by_edge(&faces);
+    let mut left = Vec::new();
+    for group in sides.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)).filter(|group| group.len() > 2) {
+        for &(low, _, h) in group {
+            let side = (left.len() as u32, ends(&faces, h).0 == low);
+            borders.entry(of[h as usize / 3]).or_default().push(side);
+        }
+        left.push(group.len());
+    }
+    let mut members = BTreeMap::<u32, Vec<usize>>::new();
+    for (face, patch) in of.iter().enumerate().filter(|(_, patch)| borders.contains_key(patch)) {
+        members.entry(*patch).or_default().push(face);
+    }
+    // Plane patches that have no other side so far.
+    let mut alone = BTreeMap::<Vec<(u32, bool)>, u32>::new();
+    let extent = |patches: [u32; 2]| {
+        let own = patches.into_iter().flat_map(|patch| &members[&patch]);
+        thickness(points, own.map(|&face| faces[face]), members[&patches[0]].len())
+    };
+    for (&patch, border) in &mut borders {
+        if extent([patch; 2]) > most {
+            continue;
+        }
+        border.sort_unstable();
+        let across: Vec<(u32, bool)> = border.iter().map(|&(edge, up)| (edge, !up)).collect();
+        let Some(&other) = alone.get(&across) else {
+            alone.insert(border.clone(), patch);
+            continue;
+        };
+        let apart = extent([patch, other]);
+        let by_edge = border.chunk_by(|a, b| a.0 == b.0);
+        let opens = |run: &[(u32, bool)]| left[run[0].0 as usize] == 2 * run.len() + 1;
+        if apart <= most && !by_edge.into_iter().any(opens) {
+            border.iter().for_each(|&(edge, _)| left[edge as usize] -= 2);
+            [patch, other]
+                .iter()
+                .flat_map(|patch| &members[patch])
+                .for_each(|&f| is_wall[f] = true);
+            distance = distance.max(apart);
+            alone.remove(&across);
+        }
+    }
+    (is_wall, distance)
+}
+
+/// Extent of faces across the plane of the `first` ones; infinite if these have no area.
+fn thickness(points: &[Vec3], faces: impl Iterator<Item = [u32; 3]> + Clone, first: usize) -> f64 {
+    let corners = faces.map(|face| face.map(|v| points[v as usize]));
+    let areas = corners.clone().take(first).map(|[a, b, c]| (b - a).cross(c - a));
+    let Some(normal) = areas.sum::<Vec3>().try_normalize() else { return f64::INFINITY };
+    let heights = corners.flatten().map(|p| p.dot(normal));
+    let (low, high) = heights
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)));
+    high - low
+}
+
 /// The parts of a closed surface. None where it is one-sided, where the directions at an edge do not match, one of its
 /// faces there has no area, or they are more than [`MOST_FACES`].
 pub(super) fn parted(points: &[Vec3], faces: &[[u32; 3]]) -> Option<Parted> {
-    let mut turned = Topology::new(points.len(), faces).turns(faces).ok()?;
-    let mut patches = DisjointSets::singletons(faces.len());
-    for group in sides_by_edge(faces).chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)) {
-        if let &[(.., g), (.., h)] = group {
-            patches.join(g / 3, h / 3);
-        }
-    }
-    let patch: Vec<u32> = (0..faces.len() as u32).map(|face| patches.find(face)).collect();
-    let mut balance = vec![0; faces.len()];
-    for (&patch, &turned) in patch.iter().zip(&turned) {
-        balance[patch as usize] += if turned { 1 } else { -1 };
-    }
-    for (&patch, turned) in patch.iter().zip(&mut turned) {
-        *turned ^= balance[patch as usize] > 0;
-    }
-    let mut faces = faces.to_vec();
-    turn_over(&mut faces, turned.iter().copied());
-
+    let Patches { mut faces, of: patch, turned } = Patches::new(points.len(), faces)?;
     let mut fans = DisjointSets::singletons(3 * faces.len());
     // Turned faces have other half-edges.
     let sides = sides_by_edge(&faces);

@@ -301,6 +301,8 @@ pub enum Repair {
     },
     /// Vertices within a distance were merged, which closed the surface.
     WeldedWithin { vertices: usize, distance: f64 },
+    /// Plane walls between touching bodies were left out; their two sides were apart by at most a distance in the unit of the file.
+    DroppedWalls { faces: usize, distance: f64 },
     /// Faces that crossed, overlapped or touched were replaced by the boundary of the region with a winding number of at least 1.
     ResolvedFaces { faces: usize, by: usize },
     /// Short edges of the new faces were contracted; no vertex was moved by more than a distance in the unit of the file.
@@ -337,6 +339,7 @@ impl Repair {
         matches!(
             self,
             Self::WeldedWithin { .. }
+                | Self::DroppedWalls { .. }
                 | Self::ResolvedFaces { .. }
                 | Self::ContractedEdges { .. }
                 | Self::SeparatedVertices { .. }
@@ -355,6 +358,7 @@ impl Repair {
             | Self::SeparatedVertices { vertices, .. }
             | Self::DroppedUnreferencedVertices { vertices } => (vertices, "vertex"),
             Self::DroppedDegenerateFaces { faces }
+            | Self::DroppedWalls { faces, .. }
             | Self::ResolvedFaces { faces, .. }
             | Self::DroppedDuplicateFaces { faces }
             | Self::ReorientedFaces { faces } => (faces, "face"),
@@ -408,6 +412,12 @@ impl fmt::Display for Repair {
                 write!(
                     f,
                     "merged {what} within {distance:.1e} of another, which closes the surface"
+                )
+            }
+            Self::DroppedWalls { distance, .. } => {
+                write!(
+                    f,
+                    "left out {what} of walls between touching bodies, {distance:.1e} apart at most"
                 )
             }
             Self::ResolvedFaces { by, .. } => {

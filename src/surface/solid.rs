@@ -7,8 +7,8 @@
 //! file.
 //!
 //! 1. *Weld*: vertices at one place; if the surface is open then, the smallest of [`TOLERANCES`] that closes it.
-//! 2. *Orient*: bodies that touch are taken apart (`parts.rs`), then turned outward, or inward where they are in an odd number
-//!    of others.
+//! 2. *Orient*: plane walls between bodies are left out, and bodies that touch taken apart (`parts.rs`). Then they are turned
+//!    outward, or inward where they are in an odd number of others. One that touches another from inside is turned with it.
 //! 3. *Resolve*: the winding number. Repeated while rounding makes faces cross.
 //! 4. *Separate*: parts that touch in a vertex or along an edge.
 
@@ -21,7 +21,7 @@ use super::check::orient_and_examine;
 use super::intersections::intersections;
 use super::mend::separate;
 use super::mesh::{TriMesh, Unit};
-use super::parts::{Parted, parted, split_at_vertices};
+use super::parts::{Parted, parted, split_at_vertices, walls};
 use super::repair::{Duplicates, Repaired, build, compact, repair, weld_within};
 use super::report::{Repair, SurfaceReport};
 use super::soup::PolygonSoup;
@@ -31,6 +31,9 @@ use crate::Vec3;
 
 /// Largest distances of welded vertices, as fractions of the diagonal of the bounding box.
 const TOLERANCES: [f64; 5] = [0.0, 1e-12, 1e-9, 1e-7, 1e-6];
+
+/// Largest thickness of a wall between bodies, as a fraction of the diagonal.
+const WALL: f64 = 1e-6;
 
 /// Length below which edges of the result are contracted, as a fraction of the diagonal.
 const SHORT: f64 = 1e-5;
@@ -55,7 +58,8 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
         return None;
     }
     let mut repairs = checked.report.repairs.clone();
-    let (built, weld) = closed(soup, unit, diagonal)?;
+    let (mut built, weld) = closed(soup, unit, diagonal)?;
+    let walls = drop_walls(&mut built);
     let (mut mesh, turns) = oriented(built)?;
     // The check dropped walls, and turned faces that it joined in another way.
     repairs.retain(|repair| {
@@ -69,7 +73,7 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
         );
         !is_of_check
     });
-    repairs.extend(weld.into_iter().chain(turns));
+    repairs.extend(weld.into_iter().chain(walls).chain(turns));
     let replaced = mesh.faces.len();
     // A weld may have been all that was missing.
     let welded = examined(&mesh)?;
@@ -87,6 +91,7 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
             return Some(loaded(found, repairs));
         }
     }
+    let mut separations = Vec::new();
     for pass in 0..PASSES {
         let mut edges = 0;
         let before = volume(&mesh, unit);
@@ -96,10 +101,9 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
             return None;
         }
         let mut found = examined(&mesh)?;
-        let mut separated = None;
         if !is_solid(&found) {
             let (mut vertices, mut faces) = touching(mesh);
-            separated = separate(&mut vertices, &mut faces);
+            separations.extend(separate(&mut vertices, &mut faces));
             found = examined(&TriMesh { vertices, faces })?;
         }
         if found.refused.is_none() {
@@ -116,7 +120,7 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
         }
         if is_solid(&found) {
             repairs.push(Repair::ResolvedFaces { faces: replaced, by: found.mesh.faces.len() });
-            repairs.extend(separated);
+            repairs.extend(separations);
             let distance = SHORT * diagonal;
             repairs.extend((edges > 0).then_some(Repair::ContractedEdges { edges, distance }));
             return Some(loaded(found, repairs));
@@ -157,8 +161,14 @@ fn examined(mesh: &TriMesh) -> Option<Inspection> {
     Some(orient_and_examine(repair(&mut soup).ok()?))
 }
 
+/// Whether an oriented surface bounds a solid. One whose shells the check turns was not what its orientation said.
 fn is_solid(found: &Inspection) -> bool {
-    found.refused.is_none() && !found.report.self_intersecting
+    let is_turned = |repair: &Repair| {
+        use Repair::{ReorientedFaces, TurnedInward, TurnedOutward};
+        matches!(repair, ReorientedFaces { .. } | TurnedInward { .. } | TurnedOutward { .. })
+    };
+    let SurfaceReport { self_intersecting, repairs, .. } = &found.report;
+    found.refused.is_none() && !self_intersecting && !repairs.iter().any(is_turned)
 }
 
 /// The triangles with doubled ones, welded within the smallest of [`TOLERANCES`] that closes the surface.
@@ -172,6 +182,26 @@ fn closed(soup: &PolygonSoup, unit: Unit, diagonal: f64) -> Option<(Repaired, Op
         let repair = (vertices > 0).then_some(Repair::WeldedWithin { vertices, distance });
         (built.topology.boundary_edges == 0).then_some((built, repair))
     })
+}
+
+/// Leaves out the walls between bodies.
+fn drop_walls(built: &mut Repaired) -> Option<Repair> {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for &p in &built.points {
+        (low, high) = (low.min(p), high.max(p));
+    }
+    let (is_wall, distance) = walls(&built.points, &built.faces, WALL * (high - low).length());
+    let faces = is_wall.iter().filter(|&&wall| wall).count();
+    if faces == 0 || faces == built.faces.len() {
+        return None;
+    }
+    let mut of_face = is_wall.iter();
+    built.faces.retain(|_| of_face.next() == Some(&false));
+    let kept = compact(built.vertices.len(), &mut built.faces);
+    (built.vertices, built.points) =
+        kept.into_iter().map(|v| (built.vertices[v as usize], built.points[v as usize])).unzip();
+    let distance = built.unit.backward(distance, 1).unwrap_or_default();
+    Some(Repair::DroppedWalls { faces, distance })
 }
 
 /// Faces oriented like their neighbours, and bodies outward, or inward where they are cavities; with the repairs. None for
@@ -193,11 +223,17 @@ fn oriented(built: Repaired) -> Option<(TriMesh, Vec<Repair>)> {
         return None;
     }
     let shells = shells(unit, &points, &apart, &topology, &found).ok()?;
-    let is_wrong = shells.iter().map(|shell| {
-        // One that touches another from inside may be a pocket or a body in it: its orientation decides.
-        shell.touched % 2 == 0 && !shell.is_flat() && !shell.is_right()
-    });
-    let is_wrong: Vec<bool> = is_wrong.collect();
+    let mut is_wrong = vec![false; shells.len()];
+    let mut outer_first: Vec<usize> = (0..shells.len()).collect();
+    outer_first.sort_by_key(|&k| shells[k].depth);
+    for k in outer_first {
+        let shell = &shells[k];
+        is_wrong[k] = match shell.touches {
+            // One that touches another from inside may be a pocket or a body in it: its orientation against that one decides.
+            Some(around) if shell.touched % 2 == 1 => is_wrong[around],
+            _ => !shell.is_flat() && !shell.is_right(),
+        };
+    }
     let mut repairs = repairs(&turned, &is_wrong, &shells, &topology.component);
     let dropped = Repair::DroppedDuplicateFaces { faces: repeated };
     repairs.extend((repeated > 0).then_some(dropped));

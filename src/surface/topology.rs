@@ -205,6 +205,8 @@ pub(super) struct Shell {
     pub depth: usize,
     /// Number of those that it touches.
     pub touched: usize,
+    /// The smallest of those.
+    pub touches: Option<usize>,
 }
 
 impl Shell {
@@ -235,8 +237,12 @@ pub(super) fn shells(
     let mut shells = volumes(points, faces, topology);
     let parts = Parts { unit, points, faces, component: &topology.component };
     let counts = depths(&parts, &topology.first_face, &intersections.components)?;
-    for (shell, [apart, touched]) in shells.iter_mut().zip(counts) {
-        (shell.depth, shell.touched) = (apart + touched, touched);
+    for (k, Around { apart, touched }) in counts.into_iter().enumerate() {
+        let size = |&other: &u32| shells[other as usize].volume.abs();
+        let touches = touched.iter().copied().min_by(|a, b| size(a).total_cmp(&size(b)));
+        let shell = &mut shells[k];
+        (shell.depth, shell.touched) = (apart + touched.len(), touched.len());
+        shell.touches = touches.map(|other| other as usize);
     }
     Ok(shells)
 }
@@ -303,6 +309,7 @@ fn volumes(points: &[Vec3], faces: &[[u32; 3]], topology: &Topology) -> Vec<Shel
             rounding: 16.0 * f64::EPSILON * size / 6.0,
             depth: 0,
             touched: 0,
+            touches: None,
         })
         .collect()
 }
@@ -330,21 +337,28 @@ pub(super) struct Parts<'a> {
 #[derive(Debug)]
 pub(super) struct TooManyNested;
 
-/// For each component the number of others it lies in, without those that it touches, and of these. `meeting` lists the
-/// pairs of components that touch or overlap, sorted.
+/// The components around one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Around {
+    /// Number of those that it does not touch.
+    pub apart: usize,
+    /// Those that it touches.
+    pub touched: Vec<u32>,
+}
+
+/// The components around each one. `meeting` lists the pairs that touch or overlap, sorted.
 pub(super) fn depths(
     parts: &Parts<'_>,
     first_face: &[u32],
     meeting: &[[u32; 2]],
-) -> Result<Vec<[usize; 2]>, TooManyNested> {
-    let mut apart = vec![0; first_face.len()];
-    let mut touched = apart.clone();
-    if apart.len() > 1 {
+) -> Result<Vec<Around>, TooManyNested> {
+    let mut around = vec![Around::default(); first_face.len()];
+    if around.len() > 1 {
         let mut budget = Budget { left: 30_000_000 + 100 * parts.faces.len() };
-        count_separate(parts, first_face, meeting, &mut apart, &mut budget)?;
-        count_touching(parts, meeting, &mut touched, &mut budget)?;
+        count_separate(parts, first_face, meeting, &mut around, &mut budget)?;
+        list_touching(parts, meeting, &mut around, &mut budget)?;
     }
-    Ok(apart.into_iter().zip(touched).map(|(apart, touched)| [apart, touched]).collect())
+    Ok(around)
 }
 
 /// Steps of work that may still be done.
@@ -364,12 +378,12 @@ fn count_separate(
     parts: &Parts<'_>,
     first_face: &[u32],
     meeting: &[[u32; 2]],
-    depths: &mut [usize],
+    found: &mut [Around],
     budget: &mut Budget,
 ) -> Result<(), TooManyNested> {
     let test = InsideTest::of_scaled(parts.unit, parts.points, parts.faces);
     // Winding around one point by component, and the components it was counted for.
-    let mut winding = vec![0; depths.len()];
+    let mut winding = vec![0; found.len()];
     let mut crossed = Vec::new();
     for (own, &face) in (0..).zip(first_face) {
         let point = parts.points[parts.faces[face as usize][0] as usize];
@@ -390,7 +404,7 @@ fn count_separate(
             let around = std::mem::take(&mut winding[other as usize]) != 0;
             let meets = meeting.binary_search(&[own.min(other), own.max(other)]).is_ok();
             if around && other != own && !meets {
-                depths[own as usize] += 1;
+                found[own as usize].apart += 1;
             }
         }
     }
@@ -447,25 +461,29 @@ impl Part {
 }
 
 /// Components around each one that they touch.
-fn count_touching(
+fn list_touching(
     parts: &Parts<'_>,
     meeting: &[[u32; 2]],
-    depths: &mut [usize],
+    found: &mut [Around],
     budget: &mut Budget,
 ) -> Result<(), TooManyNested> {
-    let mut faces: Vec<Vec<[u32; 3]>> = vec![Vec::new(); depths.len()];
+    let mut faces: Vec<Vec<[u32; 3]>> = vec![Vec::new(); found.len()];
     for (&face, &component) in parts.faces.iter().zip(parts.component) {
         faces[component as usize].push(face);
     }
     // Built on demand: most components touch no other.
-    let mut cache: Vec<Option<Part>> = (0..depths.len()).map(|_| None).collect();
+    let mut cache: Vec<Option<Part>> = (0..found.len()).map(|_| None).collect();
     for &[a, b] in meeting {
         for i in [a, b].map(|i| i as usize) {
             cache[i].get_or_insert_with(|| Part::new(parts, &faces[i]));
         }
         if let (Some(first), Some(second)) = (&cache[a as usize], &cache[b as usize]) {
-            depths[a as usize] += usize::from(lies_in(first, second, budget)?);
-            depths[b as usize] += usize::from(lies_in(second, first, budget)?);
+            if lies_in(first, second, budget)? {
+                found[a as usize].touched.push(b);
+            }
+            if lies_in(second, first, budget)? {
+                found[b as usize].touched.push(a);
+            }
         }
     }
     Ok(())

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::f64::consts::TAU;
 
 use medial::Vec3;
+use medial::geometry::glam::DMat3;
 use medial::surface::{
     self, Components, Fault, Format, Loaded, MendOptions, Repair, SurfaceError, TriMesh,
 };
@@ -86,6 +87,10 @@ fn overlapping_parts_stay_outward_and_touching_cavities_inward() {
     });
     let (vertices, largest_move) = separated.expect("six contacts");
     assert!(vertices == 6 && (largest_move - 1e-3).abs() < 1e-9, "{vertices} by {largest_move}");
+    // Only the orientation of both against each other matters.
+    let inside_out = read(&joined(&[octahedron.clone(), inverted(shell(1.0))])).report;
+    assert_eq!(inside_out.expected_betti, Some([1, 0, 1]));
+    assert_eq!(inside_out.volume, touching.report.volume);
     // And one that touches it from outside.
     let outside = moved(octahedron, |v| v + Vec3::new(2.0, 0.25, 0.125));
     assert_eq!(read(&joined(&[outside, shell(1.0)])).report.expected_betti, Some([2, 0, 0]));
@@ -162,6 +167,98 @@ fn boxes_that_touch_and_overlap_have_the_volume_of_their_union() {
         }
     }
     assert!(refused <= cases / 50, "{refused} of {cases} refused");
+}
+
+/// Bodies of whole cells, with common vertices where they touch or overlap: the number of cells in their union, and their
+/// faces, those of each body outward.
+fn bodies(random: &mut Pcg64, most: usize) -> (usize, TriMesh) {
+    const SIDE: usize = 3;
+    let planes = [(); 3].map(|()| (0..=SIDE).map(|k| k as f64).collect());
+    let mut all = HashSet::new();
+    let parts: Vec<TriMesh> = (0..random.random_range(2..=most))
+        .map(|_| {
+            let mut body = HashSet::from([[(); 3].map(|()| random.random_range(0..SIDE))]);
+            for _ in 0..random.random_range(0..6) {
+                let mut next = *body.iter().min().unwrap_or(&[0; 3]);
+                let axis = random.random_range(0..3);
+                next[axis] = random.random_range(next[axis].saturating_sub(1)..=next[axis] + 1);
+                body.insert(next.map(|k| k.min(SIDE - 1)));
+            }
+            all.extend(body.iter().copied());
+            if random.random() {
+                return cells(&planes, |cell| body.contains(&cell));
+            }
+            // Squares with other diagonals.
+            let last = SIDE - 1;
+            let mirrored = cells(&planes, |cell| body.contains(&cell.map(|k| last - k)));
+            inverted(moved(mirrored, |v| SIDE as f64 - v))
+        })
+        .collect();
+    (all.len(), joined(&parts))
+}
+
+#[test]
+fn bodies_with_common_vertices_have_the_volume_of_their_union() {
+    let mut random = Pcg64::seed_from_u64(11);
+    let mut refused = 0;
+    for case in 0..400 {
+        let (cells, mut mesh) = bodies(&mut random, 4);
+        mesh.faces.shuffle(&mut random);
+        if random.random() {
+            mesh = inverted(mesh);
+        }
+        let off = to_off(&mesh);
+        let solid =
+            surface::inspect_bytes("bodies.off", off.as_bytes()).expect("a surface").solid();
+        let Ok(Loaded { mesh, report }) = solid else {
+            refused += 1;
+            continue;
+        };
+        let volume = report.volume.expect("closed");
+        assert!(
+            (volume - cells as f64).abs() < 5e-3 * cells as f64,
+            "case {case}: {volume} for {cells}\n{off}"
+        );
+        let is_moved = mesh.vertices.iter().any(|v| v.fract() != Vec3::ZERO);
+        let is_named = report.repairs.iter().any(|repair| {
+            matches!(repair, Repair::SeparatedVertices { .. } | Repair::ContractedEdges { .. })
+        });
+        assert_eq!(is_moved, is_named, "case {case}: {:?}\n{off}", report.repairs);
+    }
+    assert!(refused <= 12, "{refused} refused");
+}
+
+#[test]
+fn overlaps_that_meet_the_bodies_along_edges_alone_are_solid() {
+    let planes = [(); 3].map(|()| vec![0.0, 1.0, 2.0, 3.0]);
+    let low = cells(&planes, |cell| cell.iter().all(|&k| k < 2));
+    let high = cells(&planes, |cell| cell.iter().all(|&k| k > 0));
+    let both = joined(&[low, high]);
+    for mesh in [inverted(both.clone()), both] {
+        let report = read(&mesh).report;
+        assert_eq!((report.volume, report.expected_betti), (Some(15.0), Some([1, 0, 0])));
+    }
+}
+
+#[test]
+fn walls_cut_in_two_ways_and_rounded_are_no_gaps() {
+    let mut random = Pcg64::seed_from_u64(3);
+    for case in 0..40 {
+        let [low, high] = [Vec3::X, Vec3::new(2.0, 1.0, 1.0)];
+        // Its squares have other diagonals.
+        let other = inverted(moved(cuboid(low, high), |v| low + high - v));
+        let axis = Vec3::from([(); 3].map(|()| random.random_range(-1.0..1.0))).normalize();
+        let turn = DMat3::from_axis_angle(axis, random.random_range(0.0..TAU));
+        let both = moved(joined(&[cube(), other]), |v| {
+            Vec3::from((turn * v).to_array().map(|x| f64::from(x as f32)))
+        });
+        let report = read(&both).report;
+        assert_eq!(report.expected_betti, Some([1, 0, 0]), "case {case}: {:?}", report.repairs);
+        let volume = report.volume.expect("closed");
+        assert!((volume - 2.0).abs() < 1e-5, "case {case}: {volume}");
+        let is_wall = |repair: &Repair| matches!(repair, Repair::DroppedWalls { faces: 4, distance } if *distance < 1e-6);
+        assert!(report.repairs.iter().any(is_wall), "case {case}: {:?}", report.repairs);
+    }
 }
 
 #[test]
