@@ -368,13 +368,13 @@ pub(super) fn parse_tree(bytes: &[u8], name: &str, options: ReadOptions) -> Load
     });
     let rows: Vec<_> = rows.collect();
     let is_row = |text: &str| text.split_ascii_whitespace().count() == 5;
-    let children = match header.as_deref() {
+    let (announced, children) = match header.as_deref() {
         // MATTopo announces the number of rows.
         Some(&[depth, children])
             if ![depth, children].contains(&rows.len())
                 && rows.first().is_some_and(|line| is_row(&line.text)) =>
         {
-            children
+            (depth, children)
         }
         _ => return parse_clump(bytes, name, options),
     };
@@ -399,11 +399,22 @@ pub(super) fn parse_tree(bytes: &[u8], name: &str, options: ReadOptions) -> Load
         let why = format!("{} rows are no whole levels with {children} children", spheres.len());
         return Err(malformed(name, None, why));
     }
-    // A place without a sphere has no radius.
-    spheres.drain(..above);
-    spheres.retain(|sphere| sphere.radius > 0.0);
+    // A place without a sphere has no radius. Spheres without any below them stand for the region below.
+    let is_there = |k: usize| spheres.get(k).is_some_and(|sphere| sphere.radius > 0.0);
+    let has_below = |k: usize| (1..=children).any(|child| is_there(k * children + child));
+    let lowest: Vec<usize> =
+        (0..spheres.len()).filter(|&k| is_there(k) && (k >= above || !has_below(k))).collect();
+    let early = lowest.iter().filter(|&&k| k < above).count();
+    let spheres = lowest.into_iter().map(|k| spheres[k]).collect();
     let mut loaded = chosen(vec![Link { spheres, ..Link::default() }], name, options)?;
-    loaded.notes.extend((above > 0).then(|| format!("took the deepest of {levels} levels")));
+    let notes = [
+        (above > 0).then(|| format!("took the deepest of {levels} levels")),
+        (early > 0).then(|| format!("spheres of higher levels without any below them: {early}")),
+        // Writers count the root, or do not.
+        (![announced, announced.saturating_add(1)].contains(&levels))
+            .then(|| format!("the header announces {announced} levels, the file holds {levels}")),
+    ];
+    loaded.notes.extend(notes.into_iter().flatten());
     Ok(loaded)
 }
 

@@ -167,6 +167,23 @@ fn trees_of_spheres_give_their_deepest_level() {
     // A child that is missing has no radius.
     let missing = read("tree.sph", &tree.replace("2 0 0 1 1", "0 0 0 0 0")).expect("a child");
     assert_eq!(missing.mesh.spheres.len(), 1);
+    // Nor have all children of the second: it stands for them. The header is short of a level.
+    let deeper =
+        "1 2\n0 0 0 2 1\n0 0 0 1 1\n2 0 0 1 1\n0 0 0 1 1\n0 0 1 1 1\n0 0 0 0 0\n0 0 0 -1 0\n";
+    let deeper = read("tree.sph", deeper).expect("three levels");
+    let centres: Vec<f64> = deeper.mesh.spheres.iter().map(|sphere| sphere.centre.x).collect();
+    assert_eq!(centres, [2.0, 0.0, 0.0]);
+    let notes = [
+        "took the deepest of 3 levels",
+        "spheres of higher levels without any below them: 1",
+        "the header announces 1 levels",
+    ];
+    assert_eq!(deeper.notes.len(), notes.len());
+    assert!(
+        notes.iter().zip(&deeper.notes).all(|(start, note)| note.starts_with(start)),
+        "{:?}",
+        deeper.notes
+    );
     let short = read("tree.sph", &(tree.to_owned() + "3 0 0 1 1\n")).unwrap_err();
     assert!(short.to_string().contains("4 rows are no whole levels"), "{short}");
     for children in ["0", "18446744073709551615"] {
