@@ -30,7 +30,6 @@ use medial::complex::Sphere;
 use medial::geometry::separation_angle;
 use medial::shape::Shape;
 use medial::simplifier::{Diagnostics, Method, MethodInfo, NativeLevel, ParamFields, RunContext};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::ranked::{FacetSet, Published, Ranked, RankedFacets, Scale};
@@ -130,21 +129,18 @@ fn rank_spheres(shape: &Shape, run: &RunContext) -> Result<Ranked> {
 //   measured. The scale axis tool uses the mean of the vertices for its own filter.
 
 /// Ranks the Voronoi facets. `O(n)` for their vertices.
-fn rank_facets(shape: &Shape, run: &RunContext) -> Result<RankedFacets<'static>> {
+fn rank_facets(shape: &Shape, run: &RunContext) -> Result<RankedFacets> {
     let set = FacetSet::of(shape)?;
     let delaunay = shape.delaunay()?;
-    let values: Vec<f64> = (0..set.facets.len())
-        .into_par_iter()
-        .map(|facet| {
-            let ends = set.facets.ends(facet).map(|v| delaunay.point(v));
-            let vertices =
-                set.facets.polygon(facet).iter().map(|&s| set.mesh.spheres[s as usize].centre);
-            let count = vertices.len() as f64;
-            angle_from(vertices.sum::<Vec3>() / count, ends)
-        })
-        .collect();
     run.check()?;
-    Ok(RankedFacets::new(set, values, scale(), Diagnostics::default()))
+    let (facets, mesh) = (set.facets.clone(), set.mesh.clone());
+    let value = |facet| {
+        let ends = facets.ends(facet).map(|v| delaunay.point(v));
+        let vertices = facets.polygon(facet).iter().map(|&s| mesh.spheres[s as usize].centre);
+        let count = vertices.len() as f64;
+        angle_from(vertices.sum::<Vec3>() / count, ends)
+    };
+    Ok(RankedFacets::new(set, value, scale(), Diagnostics::default()))
 }
 
 /// Distance from the middle of two samples up to which a point counts as the middle, in chords.

@@ -82,9 +82,7 @@ impl Ranked {
     }
 
     fn by_level(&self, level: f64) -> (Vec<bool>, f64) {
-        let inclusive = self.scale.inclusive;
-        let kept = self.value.iter().map(|&value| value > level || inclusive && value == level);
-        (kept.collect(), level)
+        (self.value.iter().map(|&value| self.scale.keeps(value, level)).collect(), level)
     }
 }
 
@@ -141,6 +139,10 @@ pub(crate) enum Wanted {
 }
 
 impl Scale {
+    fn keeps(&self, value: f64, level: f64) -> bool {
+        value > level || self.inclusive && value == level
+    }
+
     /// The request of a level; a documented level is announced in `diagnostics`.
     pub(crate) fn wanted(&self, level: Level, diagnostics: &mut Diagnostics) -> Result<Wanted> {
         match some_spheres(level)? {
@@ -260,50 +262,30 @@ impl FacetSet {
     }
 }
 
-/// The value by which facets are ranked.
-pub(crate) trait FacetValue: Send + Sync {
-    /// The value of a facet, in native units; larger values are kept longer.
-    fn value(&self, facet: usize) -> f64;
-
-    /// Whether the value of a facet is above a level. To be overridden where that is known sooner
-    /// than the value.
-    fn is_above(&self, level: f64) -> Box<dyn Fn(usize) -> bool + Sync + '_> {
-        Box::new(move |facet| self.value(facet) > level)
-    }
-}
-
-impl FacetValue for Vec<f64> {
-    fn value(&self, facet: usize) -> f64 {
-        self[facet]
-    }
-}
-
-/// Facets with a value for each.
-pub(crate) struct RankedFacets<'s> {
+/// Facets with a value for each, in native units; larger values are kept longer.
+pub(crate) struct RankedFacets {
     set: FacetSet,
-    value: Box<dyn FacetValue + 's>,
+    value: Vec<f64>,
     scale: Scale,
     /// Counts and warnings of the preparation, repeated with every level.
     prepared: Diagnostics,
 }
 
-impl<'s> RankedFacets<'s> {
-    /// Ranks facets by `value`.
+impl RankedFacets {
+    /// Ranks facets by the values of `value(facet)`. Parallel.
     pub(crate) fn new(
         set: FacetSet,
-        value: impl FacetValue + 's,
+        value: impl Fn(usize) -> f64 + Sync + Send,
         scale: Scale,
         prepared: Diagnostics,
     ) -> Self {
-        Self { set, value: Box::new(value), scale, prepared }
+        let value = (0..set.facets.len()).into_par_iter().with_min_len(256).map(value).collect();
+        Self { set, value, scale, prepared }
     }
 
-    /// Values and facets by descending value. Only numbers of spheres need it, and each pays for it,
-    /// because native levels are often decided without the values.
+    /// Values and facets by descending value. Only numbers of spheres need it, and each pays for it.
     fn order(&self) -> Vec<(f64, u32)> {
-        let facets = (0..self.set.facets.len()).into_par_iter().with_min_len(256);
-        let mut ranked: Vec<(f64, u32)> =
-            facets.map(|facet| (self.value.value(facet), facet as u32)).collect();
+        let mut ranked: Vec<(f64, u32)> = self.value.iter().copied().zip(0..).collect();
         ranked.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         break_ties(&mut ranked, |(value, _)| value, |(_, facet)| self.set.middle(facet));
         ranked
@@ -327,15 +309,10 @@ impl<'s> RankedFacets<'s> {
 
     /// The facets that a native level keeps, ascending.
     fn by_level(&self, level: f64) -> Vec<u32> {
-        let (value, inclusive) = (&self.value, self.scale.inclusive);
-        let is_above = value.is_above(level);
-        (0..self.set.facets.len() as u32)
-            .into_par_iter()
-            .with_min_len(256)
-            .filter(|&facet| {
-                let facet = facet as usize;
-                is_above(facet) || (inclusive && value.value(facet) == level)
-            })
+        (0..)
+            .zip(&self.value)
+            .filter(|&(_, &value)| self.scale.keeps(value, level))
+            .map(|(id, _)| id)
             .collect()
     }
 
@@ -351,7 +328,7 @@ impl<'s> RankedFacets<'s> {
     }
 }
 
-impl Simplification for RankedFacets<'_> {
+impl Simplification for RankedFacets {
     fn at(&mut self, level: Level) -> Result<Simplified> {
         if self.set.facets.is_empty() {
             // A tetrahedron has a Voronoi vertex inside, but no facet around it.
@@ -365,7 +342,7 @@ impl Simplification for RankedFacets<'_> {
             Wanted::Native(level) => (self.by_level(level), level),
         };
         let FacetSet { mesh, facets, dual } = &self.set;
-        let mesh = facets.subcomplex(mesh, *dual, &kept, &[], &[]);
+        let mesh = facets.subcomplex(mesh, *dual, &kept);
         let reached = mesh.spheres.len();
         match level {
             Level::Spheres(requested) if reached != requested => diagnostics.warn(format!(

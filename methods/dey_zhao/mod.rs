@@ -45,18 +45,15 @@
 mod tests;
 mod umbrella;
 
-use std::f64::consts::FRAC_PI_2;
 use std::ops::Bound;
-use std::sync::Arc;
 
-use medial::Vec3;
-use medial::complex::VoronoiFacets;
+use medial::geometry::{Delaunay, VertexId};
 use medial::shape::Shape;
 use medial::simplifier::{Diagnostics, Method, MethodInfo, NativeLevel, ParamFields, RunContext};
-use umbrella::{Place, Umbrellas};
+use umbrella::Umbrellas;
 
 use crate::levels::{BySamples, within};
-use crate::ranked::{FacetSet, FacetValue, Published, RankedFacets, Scale};
+use crate::ranked::{FacetSet, Published, RankedFacets, Scale};
 use crate::{Prepared, Result};
 
 medial::parameters! {
@@ -124,11 +121,7 @@ fn scale() -> Scale {
 }
 
 /// Steps 1 to 3 on the samples of a shape.
-fn selection(
-    shape: &Shape,
-    params: DeyZhaoParams,
-    run: &RunContext,
-) -> Result<RankedFacets<'static>> {
+fn selection(shape: &Shape, params: DeyZhaoParams, run: &RunContext) -> Result<RankedFacets> {
     let set = FacetSet::of(shape)?;
     run.check()?;
     let delaunay = shape.delaunay()?;
@@ -137,125 +130,37 @@ fn selection(
     let mut diagnostics = Diagnostics::default();
     diagnostics.count("samples_without_umbrella", umbrellas.missing());
     diagnostics.count("umbrella_triangles_without_area", umbrellas.flat());
-    let strength = Strength { facets: set.facets.clone(), umbrellas, params };
-    Ok(RankedFacets::new(set, strength, scale(), diagnostics))
+    let (facets, strength) =
+        (set.facets.clone(), Strength { delaunay: &delaunay, umbrellas, params });
+    Ok(RankedFacets::new(set, |facet| strength.of(facets.ends(facet)), scale(), diagnostics))
 }
 
 /// Step 3.
-struct Strength {
-    facets: Arc<VoronoiFacets>,
+struct Strength<'a> {
+    delaunay: &'a Delaunay,
     umbrellas: Umbrellas,
     params: DeyZhaoParams,
 }
 
-impl FacetValue for Strength {
+impl Strength<'_> {
     /// The largest strength at which the facet dual to a Delaunay edge is kept: from either end, by
     /// either condition.
-    fn value(&self, facet: usize) -> f64 {
-        let [p, q] = self.ends(facet);
+    fn of(&self, [p, q]: [VertexId; 2]) -> f64 {
         self.from(p, q).max(self.from(q, p))
     }
 
-    fn is_above(&self, level: f64) -> Box<dyn Fn(usize) -> bool + Sync + '_> {
-        let DeyZhaoParams { theta, rho } = self.params;
-        // Angles to a normal are compared by their cosine, so the threshold is a sine of `theta`.
-        let cosine = (level * theta.to_radians()).min(FRAC_PI_2).sin();
-        // An edge of an umbrella is perpendicular to a normal and no longer than two circumradii.
-        let rims = cosine < 1e-6 || level * rho < 2.0 + 1e-6;
-        let threshold = Threshold { level, cosine, ratio: level * rho, rims };
-        Box::new(move |facet| {
-            let [p, q] = self.ends(facet);
-            let edge = self.umbrellas.position(q) - self.umbrellas.position(p);
-            let length = edge.length();
-            self.passes_from(p, q, edge, length, &threshold)
-                || self.passes_from(q, p, edge, length, &threshold)
-        })
-    }
-}
-
-/// A strength as a cosine and a ratio, with which a facet is decided without computing an angle or a
-/// quotient, except within [`ROUNDING`] of the threshold.
-struct Threshold {
-    level: f64,
-    cosine: f64,
-    ratio: f64,
-    /// Whether an edge of an umbrella could pass.
-    rims: bool,
-}
-
-/// Bound on the relative rounding error of a strength and a threshold together.
-const ROUNDING: f64 = 1e-12;
-
-impl Strength {
-    fn ends(&self, facet: usize) -> [Place; 2] {
-        self.facets.ends(facet).map(|v| self.umbrellas.place(v))
-    }
-
     /// The strength from `p` alone, 0 for an edge of its umbrella.
-    fn from(&self, p: Place, q: Place) -> f64 {
+    fn from(&self, p: VertexId, q: VertexId) -> f64 {
         let normals = self.umbrellas.normals(p);
         if normals.is_empty() || self.umbrellas.has_edge(p, q) {
             return 0.0;
         }
-        let edge = self.umbrellas.position(q) - self.umbrellas.position(p);
+        let edge = self.delaunay.point(q) - self.delaunay.point(p);
         let length = edge.length();
-        // Normals have either sign: the angle of the condition is that of two lines.
+        // Normals have either sign: the angle of the condition is that of two lines. The smallest product
+        // of the edge with a normal belongs to the largest angle.
         let least = normals.iter().map(|n| n.dot(edge).abs()).fold(length, f64::min);
-        self.by_angle(least, length).max(self.by_ratio(p, length))
-    }
-
-    /// Whether [`Strength::from`] is above a level. `edge` is `pq` or `qp`.
-    #[inline]
-    fn passes_from(
-        &self,
-        p: Place,
-        q: Place,
-        edge: Vec3,
-        length: f64,
-        threshold: &Threshold,
-    ) -> bool {
-        let normals = self.umbrellas.normals(p);
-        // Without an umbrella there is no condition, and nothing is kept from this end.
-        if normals.is_empty() {
-            return false;
-        }
-        // The ratio first: one comparison against a product per normal. The search through the rim
-        // last, since few edges pass.
-        let passes =
-            self.is_long(p, length, threshold) || self.is_steep(normals, edge, length, threshold);
-        passes && !(threshold.rims && self.umbrellas.has_edge(p, q))
-    }
-
-    #[inline]
-    fn is_steep(&self, normals: &[Vec3], edge: Vec3, length: f64, threshold: &Threshold) -> bool {
-        let bound = threshold.cosine * length;
-        let mut least = length;
-        for normal in normals {
-            least = f64::min(least, normal.dot(edge).abs());
-            // One normal suffices to fail, and most edges fail at the first.
-            if least <= bound * (1.0 - ROUNDING) {
-                return false;
-            }
-        }
-        least > bound * (1.0 + ROUNDING) || self.by_angle(least, length) > threshold.level
-    }
-
-    #[inline]
-    fn is_long(&self, p: Place, length: f64, threshold: &Threshold) -> bool {
-        let bound = threshold.ratio * self.umbrellas.largest_circumradius(p);
-        length > bound * (1.0 - ROUNDING)
-            && (length > bound * (1.0 + ROUNDING) || self.by_ratio(p, length) > threshold.level)
-    }
-
-    /// The strength by the angle condition: `least` is the smallest product of the edge with a normal,
-    /// which belongs to the largest angle.
-    fn by_angle(&self, least: f64, length: f64) -> f64 {
-        (least / length).asin() / self.params.theta.to_radians()
-    }
-
-    /// The strength by the ratio condition.
-    #[inline]
-    fn by_ratio(&self, p: Place, length: f64) -> f64 {
-        length / self.umbrellas.largest_circumradius(p) / self.params.rho
+        let by_angle = (least / length).asin() / self.params.theta.to_radians();
+        by_angle.max(length / self.umbrellas.largest_circumradius(p) / self.params.rho)
     }
 }

@@ -33,8 +33,6 @@ class Angle(Options, total=False):
 class Lambda(Options, total=False):
     """Options of `lambda`."""
 
-    variant: Literal["vertex", "cell"]
-
 
 class DeyZhao(Options, total=False):
     """Options of `dey-zhao`."""

@@ -129,7 +129,7 @@ def calls(axis: MedialAxis, method: str, own: type) -> MedialAxis:
     axis.simplify("angle", level=60, variant="face")  # wrong
     axis.simplify("angel", level=60, theta=60)  # wrong
     axis.simplify(method, spheres=3, k=0)  # wrong
-    return axis.simplify("lambda", level=0.05, variant="cell", params=None)
+    return axis.simplify("lambda", level=0.05, params=None)
 """
 
 

@@ -474,26 +474,23 @@ impl VoronoiFacets {
         parts.collect::<Vec<_>>().concat()
     }
 
-    /// The closure of some facets, and of further edges and vertices, as a complex of its own:
-    /// spheres keep their order and their contacts. `mesh` is the Voronoi medial mesh.
+    /// The closure of some facets as a complex of its own: spheres keep their order and their
+    /// contacts. `mesh` is the Voronoi medial mesh.
     ///
     /// # Panics
-    /// If `mesh` is not that of these facets, or an edge or a vertex names no sphere of it.
+    /// If `mesh` is not that of these facets.
     pub fn subcomplex(
         &self,
         mesh: &MedialMesh,
         dual: DualTriangulation,
         facets: &[u32],
-        edges: &[[u32; 2]],
-        vertices: &[u32],
     ) -> MedialMesh {
         let mut kept = vec![false; mesh.spheres.len()];
-        let polygons = facets.iter().flat_map(|&facet| self.polygon(facet as usize));
-        for &sphere in polygons.chain(edges.as_flattened()).chain(vertices) {
+        for &sphere in facets.iter().flat_map(|&facet| self.polygon(facet as usize)) {
             kept[sphere as usize] = true;
         }
         let triangles = self.triangles(facets, &mesh.spheres, dual);
-        let whole = MedialMesh::from_simplices(mesh.spheres.clone(), edges.to_vec(), triangles)
+        let whole = MedialMesh::from_simplices(mesh.spheres.clone(), Vec::new(), triangles)
             .expect("a part of a valid complex");
         MedialMesh { contacts: mesh.contacts.clone(), ..whole }.induced(&kept)
     }

@@ -12,7 +12,6 @@ fn wrong_parameters_are_refused_by_name() {
     let shape = default_shape("box");
     for (method, wrong) in [
         ("angle", "variant=cell"),
-        ("lambda", "variant=facet"),
         ("dey-zhao", "theta=0 theta=90 rho=0 rho=-8"),
         ("qmat", "k=-1 k_boundary=-1 topology_from=some"),
         ("tam-heidrich", "t_v=-1 t_v=1,many t_v=[1,101] drop=2 t_t_rounds=1.5"),

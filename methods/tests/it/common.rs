@@ -7,7 +7,6 @@ use medial::simplifier::{Level, Params, RunContext, Simplified, SimplifyError};
 use medial::surface::{self, TriMesh};
 
 pub const FACET: &[(&str, &str)] = &[("variant", "facet")];
-pub const CELL: &[(&str, &str)] = &[("variant", "cell")];
 
 pub fn shape_of(mesh: &TriMesh) -> Shape {
     let report = surface::validate(mesh).expect("a solid");

@@ -1,12 +1,11 @@
-//! The variants of the angle filter and of the lambda-medial axis: thresholds on boxes and plates,
-//! incidence, topology, scale.
+//! The variants of the angle filter and the lambda-medial axis: thresholds on boxes, ties, levels.
 
 use medial::Vec3;
 use medial::complex::MedialMesh;
 use medial::shape::Shape;
 use medial::simplifier::{Level, RunContext, SimplifyError};
 
-use crate::common::{CELL, FACET, at, built_in, default_shape, levels, params, shape, shape_of};
+use crate::common::{FACET, at, built_in, default_shape, levels, params, shape, shape_of};
 
 /// A solid box around the origin, in the shape's units: its half sides, descending, and how far a point
 /// is from the central rectangle.
@@ -22,10 +21,6 @@ impl Cuboid {
         let half = (hi - lo) / 2.0;
         let thinnest = (0..3).min_by(|&a, &b| half[a].total_cmp(&half[b])).expect("three");
         Self { middle: lo.midpoint(hi), half, thinnest }
-    }
-
-    fn thickness(&self) -> f64 {
-        2.0 * self.half[self.thinnest]
     }
 
     fn rectangle(&self) -> Vec3 {
@@ -92,47 +87,6 @@ fn the_axis_above_a_right_angle_is_the_central_rectangle_of_a_box() {
 }
 
 #[test]
-fn lambda_keeps_the_facets_of_its_table_on_a_box_and_a_plate() {
-    for id in ["box", "plate"] {
-        let shape = default_shape(id);
-        let (cuboid, h) = (Cuboid::of(&shape), spacing(&shape));
-        let half = cuboid.thickness() / 2.0;
-        // A facet has exactly half of the thickness where its two samples are opposite.
-        let mesh = at(&shape, "lambda", CELL, Level::Native(half * (1.0 - 1e-9)));
-        assert!(cuboid.uncovered(&mesh) < 3.0 * h, "{id}");
-        let beyond = (half * half + h * h).sqrt() * (1.0 + 1e-9);
-        assert!(at(&shape, "lambda", CELL, Level::Native(beyond)).spheres.is_empty(), "{id}");
-        // Sheets from the edges go up to the radius sqrt 2 lambda.
-        let lambda = 0.6 * half;
-        if lambda > 3.0 * h {
-            let mesh = at(&shape, "lambda", CELL, Level::Native(lambda));
-            for sphere in &mesh.spheres {
-                assert!(sphere.radius > 2.0_f64.sqrt() * (lambda - h), "{id}: {sphere:?}");
-            }
-            let least = mesh.spheres.iter().map(|s| s.radius).fold(f64::INFINITY, f64::min);
-            assert!(least < 2.0_f64.sqrt() * (lambda + 2.0 * h), "{id}: {least}");
-        }
-    }
-}
-
-#[test]
-fn lambda_cells_are_nested_and_meet_counts() {
-    let shape = default_shape("capsule");
-    let wanted = [0.01, 0.03, 0.06, 0.1, 0.14].map(Level::Native);
-    let found = levels(&shape, "lambda", CELL, &wanted).into_iter();
-    let meshes: Vec<MedialMesh> = found.map(|level| level.expect("in range").mesh).collect();
-    for pair in meshes.windows(2) {
-        assert!(pair[1].spheres.iter().all(|s| pair[0].spheres.contains(s)));
-    }
-    let shape = default_shape("blob");
-    for count in [700, 100, 7] {
-        // Neighbours whose enclosing balls rest on the same samples have the same value.
-        let reached = at(&shape, "lambda", CELL, Level::Spheres(count)).spheres.len();
-        assert!(reached <= count && reached * 10 >= count * 8, "{reached} for {count}");
-    }
-}
-
-#[test]
 fn kept_items_among_ties_are_spread_over_the_shape() {
     // All facets of the middle sheet tie, and cut by their numbers they would be one end of it.
     let shape = default_shape("plate");
@@ -154,7 +108,7 @@ fn variants_of_voronoi_facets_refuse_a_given_mesh() {
         let back = *shape.normalisation();
         shape_of(&mesh).with_initial(&given.to_input(&back))
     };
-    for (method, set) in [("angle", FACET), ("lambda", CELL), ("dey-zhao", &[])] {
+    for (method, set) in [("angle", FACET), ("dey-zhao", &[])] {
         let method = medial_methods::find(method).expect("registered");
         let refused = method.prepare(&shape, &params(set), &RunContext::default()).err();
         assert!(matches!(refused, Some(SimplifyError::Unsupported { .. })), "{set:?}");
@@ -162,14 +116,12 @@ fn variants_of_voronoi_facets_refuse_a_given_mesh() {
 }
 
 // ----------------------------------------------------------------------------
-// The levels that the variants of the angle filter and of the lambda-medial axis support, and how they meet a
-// number of spheres.
+// The levels that they support, and how they meet a number of spheres.
 
 #[test]
 fn counts_are_met_from_below_or_with_a_warning() {
     let shape = default_shape("bracket");
-    let all = [("angle", FACET), ("lambda", CELL)];
-    for (method, set) in all {
+    for (method, set) in [("angle", FACET), ("lambda", &[])] {
         let wanted = [600, 100, 20].map(Level::Spheres);
         for (found, count) in levels(&shape, method, set, &wanted).into_iter().zip([600, 100, 20]) {
             let found = found.expect("a count");
@@ -185,8 +137,7 @@ fn counts_are_met_from_below_or_with_a_warning() {
 #[test]
 fn the_published_level_is_announced_and_is_a_native_one() {
     let shape = default_shape("bracket");
-    let all = [("angle", FACET), ("lambda", CELL)];
-    for (method, set) in all.into_iter().chain([("angle", [].as_slice()), ("lambda", &[])]) {
+    for (method, set) in [("angle", FACET), ("angle", &[]), ("lambda", &[])] {
         let published =
             levels(&shape, method, set, &[Level::Published]).remove(0).expect("a level");
         let warnings = &published.diagnostics.warnings;
