@@ -1,8 +1,5 @@
-//! PMAT on the medial meshes of sampled solids, and uses of a hierarchy.
+//! PMAT on the medial meshes of sampled solids.
 
-use std::sync::Arc;
-
-use medial::complex::collapse::{CollapseComplex, Hierarchy};
 use medial::shape::Shape;
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplification};
 use medial_methods::pmat;
@@ -11,27 +8,6 @@ use crate::common::shape;
 
 fn prepare(shape: &Shape) -> Box<dyn Simplification + '_> {
     pmat::method().prepare(shape, &Params::none(), &RunContext::default()).expect("prepared")
-}
-
-fn hierarchy(shape: &Shape) -> Arc<Hierarchy> {
-    let end = prepare(shape).at(Level::Published).expect("the end");
-    end.extras.get_shared().expect("PMAT has a hierarchy")
-}
-
-#[test]
-fn levels_are_those_of_the_collapse_engine() {
-    let shape = shape("bracket", 8);
-    let hierarchy = hierarchy(&shape);
-    let initial = hierarchy.initial();
-    let last = hierarchy.steps().len();
-    let mut complex = CollapseComplex::from_mesh(initial);
-    for (stage, step) in hierarchy.steps().iter().enumerate() {
-        if [0, 1, last / 3, last / 2, last - 3].contains(&stage) {
-            assert_eq!(hierarchy.mesh(stage), complex.to_mesh(), "{stage}");
-        }
-        complex.collapse(step.kept, step.removed, initial.spheres[step.kept as usize]);
-    }
-    assert_eq!(hierarchy.mesh(last), complex.to_mesh());
 }
 
 #[test]
