@@ -251,14 +251,14 @@ fn slabs_match_brute_force() {
     check_classes(classes, triple, [40, 100], &mut Pcg64::seed_from_u64(2));
 }
 
-fn any_class() -> impl Strategy<Value = (Spheres, Vec3, u64)> {
+fn any_class() -> impl Strategy<Value = (Spheres, Vec3)> {
     let classes: Vec<(usize, &str)> =
         TRIPLES.map(|c| (3, c)).into_iter().chain(PAIRS.map(|c| (2, c))).collect();
     (proptest::sample::select(classes), any::<u64>()).prop_map(|((count, class), seed)| {
         let mut rng = Pcg64::seed_from_u64(seed);
         let spheres = if count == 3 { triple(class, &mut rng) } else { pair(class, &mut rng) };
         let p = vector(&mut rng) * 2.0;
-        (spheres, p, seed)
+        (spheres, p)
     })
 }
 
@@ -282,7 +282,7 @@ proptest! {
     /// The direction from the nearest centre supports the hull: no ball reaches beyond the nearest
     /// point in it.
     #[test]
-    fn nearest_centres_attain_the_distance((spheres, p, _) in any_class()) {
+    fn nearest_centres_attain_the_distance((spheres, p) in any_class()) {
         let (distance, centre) = match *spheres {
             [a, b] => {
                 let cone = Cone::new(a, b);
@@ -309,46 +309,7 @@ proptest! {
     }
 
     #[test]
-    fn distances_are_lipschitz((spheres, p, seed) in any_class()) {
-        let q = p + vector(&mut Pcg64::seed_from_u64(seed ^ 1)) * 0.5;
-        let change = (signed(&spheres, p) - signed(&spheres, q)).abs();
-        prop_assert!(change <= p.distance(q) + 1e-14 * scale(&spheres, p).max(1.0));
-    }
-
-    #[test]
-    fn distances_do_not_depend_on_the_order((spheres, p, _) in any_class()) {
-        let expected = signed(&spheres, p);
-        let mut turned = spheres.clone();
-        for _ in 0..spheres.len() {
-            turned.rotate_left(1);
-            for order in [turned.clone(), turned.iter().rev().copied().collect()] {
-                prop_assert!((signed(&order, p) - expected).abs() <= 1e-12);
-            }
-        }
-    }
-
-    #[test]
-    fn distances_move_with_the_spheres((spheres, p, seed) in any_class()) {
-        let mut rng = Pcg64::seed_from_u64(seed ^ 2);
-        let turn = glam::DQuat::from_axis_angle(unit(&mut rng), rng.random::<f64>() * 6.0);
-        let shift = vector(&mut rng);
-        let moved: Spheres =
-            spheres.iter().map(|m| Sphere::new(turn * m.centre + shift, m.radius)).collect();
-        let after = signed(&moved, turn * p + shift);
-        // Moving rounds the centres, which is all that thin configurations feel.
-        prop_assert!((after - signed(&spheres, p)).abs() <= 1e-11);
-    }
-
-    #[test]
-    fn growing_all_radii_shrinks_the_distance((spheres, p, seed) in any_class()) {
-        let t = Pcg64::seed_from_u64(seed ^ 3).random::<f64>();
-        let grown: Spheres =
-            spheres.iter().map(|m| Sphere::new(m.centre, m.radius + t)).collect();
-        prop_assert!((signed(&grown, p) + t - signed(&spheres, p)).abs() <= 1e-12);
-    }
-
-    #[test]
-    fn nearest_spheres_attain_the_distance_and_have_their_weights((spheres, p, _) in any_class()) {
+    fn nearest_spheres_attain_the_distance_and_have_their_weights((spheres, p) in any_class()) {
         let (m, weights) = nearest_sphere(&spheres, p);
         prop_assert!((m.signed_distance(p) - signed(&spheres, p)).abs() <= 1e-12);
         prop_assert!(weights.iter().all(|&w| w >= 0.0));
