@@ -3,7 +3,7 @@
 //! Every method implements [`medial::simplifier::MedialSimplifier`] and knows neither the others
 //! nor the runner. [`registry`] lists them in the order of every table.
 
-use medial::simplifier::{Level, MedialSimplifier, Registered, Simplification, SimplifyError};
+use medial::simplifier::{MedialSimplifier, Registered, Simplification, SimplifyError};
 
 pub mod angle;
 pub mod aof;
@@ -37,21 +37,18 @@ pub fn registry() -> Vec<Registered> {
                 "Removing spikes of any size from the axis of dense samples, where \
                  thousands of spheres may stay.",
             )
-            .filter(Level::Published)
             .sweep(&[30.0, 60.0, 120.0]),
         Registered::from(lambda::method())
             .best_for(
                 "Removing features by absolute size from the axis of dense samples, \
                  with a proof that the rest is stable.",
             )
-            .filter(Level::Published)
             .sweep(&[0.01, 0.02]),
         Registered::from(dey_zhao::method())
             .best_for(
                 "An axis of dense samples of any shape, without a parameter to \
                  tune.",
             )
-            .filter(Level::Published)
             .sweep(&[1.0, 2.0, 3.0]),
         Registered::from(qmat::method()).best_for(
             "A small number of spheres in about a second, each placed where its \
@@ -71,23 +68,16 @@ pub fn registry() -> Vec<Registered> {
                 "Removing features that are small for their surroundings, while \
                  equally small ones elsewhere stay.",
             )
-            .filter(Level::Published)
             .sweep(&[1.1, 1.5, 2.0]),
-        Registered::from(sat_pairwise::method())
-            .filter(Level::Native(1.1))
-            .sweep(&[1.1, 1.5, 2.0])
-            .on_request(),
+        Registered::from(sat_pairwise::method()).sweep(&[1.1, 1.5, 2.0]).on_request(),
         Registered::from(tam_heidrich::method())
             .best_for("Removing whole features of little volume, while loops stay.")
-            .filter(Level::Published)
             .sweep(&[1.0, 5.0]),
         Registered::from(aof::method())
             .best_for(
                 "An axis of thousands of spheres straight from the surface, where \
                  its samples give too poor a start.",
             )
-            // The published lattice takes far longer: that of the other levels is enough.
-            .filter(Level::Native(30.0))
             .sweep(&[15.0, 30.0, 60.0]),
         Registered::from(coverage_axis::method())
             .best_for(
@@ -159,11 +149,10 @@ const SECONDS: [(&str, f64); 15] = [
     ("tight", 26.0),
 ];
 
-/// The place of a method from cheap to dear: comparisons run in this order. A chain costs as much as its
-/// dearer part; methods from elsewhere come last.
+/// The place of a method from cheap to dear: comparisons run in this order. Methods
+/// from elsewhere come last.
 pub fn cost_rank(id: &str) -> usize {
-    let place = |part: &str| SECONDS.iter().position(|&(known, _)| known == part);
-    id.split('+').filter_map(place).max().unwrap_or(SECONDS.len())
+    SECONDS.iter().position(|&(known, _)| known == id).unwrap_or(SECONDS.len())
 }
 
 /// The method with an id, or `None`. [`initial`] simplifies nothing and is not among them.
@@ -270,7 +259,6 @@ mod tests {
         for Registered { method, .. } in registry() {
             assert!(cost_rank(&method.info().id) < SECONDS.len(), "{}", method.info().id);
         }
-        assert_eq!(cost_rank("angle+hem"), cost_rank("hem"));
         assert!(cost_rank("qmat") < cost_rank("hem") && cost_rank("hem") < cost_rank("theirs"));
         assert!(SECONDS[1..].is_sorted_by(|(_, a), (_, b)| a <= b), "after the start");
     }

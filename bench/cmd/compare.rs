@@ -54,9 +54,6 @@ pub struct Arguments {
     /// Search the fewest spheres within each of these Hausdorff errors, as fractions of the diagonal.
     #[arg(long, value_name = "E,F", value_delimiter = ',')]
     max_error: Vec<f64>,
-    /// Also run these methods on the output of each filter: `qmat` adds `angle+qmat` and so on.
-    #[arg(long, value_name = "IDS", value_delimiter = ',')]
-    after_filters: Vec<String>,
     /// Also run each method at its published level.
     #[arg(long)]
     published: bool,
@@ -256,7 +253,6 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     }
     replace(&mut study.spheres, &arguments.spheres);
     replace(&mut study.max_error, &arguments.max_error);
-    replace(&mut study.after_filters, &arguments.after_filters);
     study.counts_only |= arguments.counts_only;
     study.published |= arguments.published;
     study.repeat = arguments.repeat.unwrap_or(study.repeat);
@@ -299,9 +295,8 @@ impl Arguments {
         if self.levels.is_empty() {
             return Ok(());
         }
-        // Chains and defaults become rows, so that the option can name any of them.
+        // Defaults become rows, so that the option can name any of them.
         study.methods = study.entries(registry)?.into_iter().map(|(method, _)| method).collect();
-        study.after_filters.clear();
         for word in &self.levels {
             let wrong =
                 || Failure::usage(format!("--levels {word}: expected METHOD=LEVEL[,LEVEL...]"));

@@ -120,8 +120,6 @@ pub struct Study {
     pub against: Option<PathBuf>,
     /// Plug-in files.
     pub plugins: Vec<PathBuf>,
-    /// Further methods that start from the output of each filter.
-    pub after_filters: Vec<String>,
     /// Methods with their parameters [default: all but those on request].
     #[serde(rename = "method")]
     pub methods: Vec<StudyMethod>,
@@ -180,7 +178,6 @@ impl Default for Study {
             keep: Keep::default(),
             against: None,
             plugins: vec![],
-            after_filters: vec![],
             methods: vec![],
             given: vec![],
         }
@@ -340,11 +337,6 @@ impl Study {
         let mut methods = self.methods.clone();
         if methods.is_empty() {
             methods = registry.usual().map(|e| StudyMethod::of(e.id())).collect();
-        }
-        for then in &self.after_filters {
-            let filters = registry.entries().iter().filter(|e| e.presentation().filter.is_some());
-            let chains = filters.map(|filter| format!("{}+{then}", filter.id()));
-            methods.extend(chains.map(|id| StudyMethod::of(&id)));
         }
         // The start of all methods, in the first row to compare with.
         if !self.counts_only {

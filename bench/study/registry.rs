@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use medial::simplifier::{Chain, Level, MedialSimplifier, MethodInfo, Presentation, Registered};
+use medial::simplifier::{MedialSimplifier, MethodInfo, Presentation, Registered};
 use medial_methods::initial;
 use medial_run::hash::hex_digest;
 use serde::{Serialize, Serializer};
@@ -22,9 +22,8 @@ const RUNNER: u32 = 1;
 /// Methods by id, in the order of the tables.
 pub struct Registry {
     entries: Vec<Entry>,
-    /// Entries that can be run but are not methods: the initial medial mesh, external results, and every ordered pair of
-    /// methods, run one after the other. Made eagerly, so that an id means the same in a worker.
-    others: Vec<Entry>,
+    /// Entries that can be run but are not methods: the initial medial mesh and external results.
+    others: [Entry; 2],
     /// The plug-in files that were added, as absolute paths.
     files: Vec<PathBuf>,
     /// Loader of plug-in files in the host's language.
@@ -74,21 +73,6 @@ impl Entry {
         Self { method: method.into(), presentation, fingerprint, version }
     }
 
-    fn chain(first: &Self, then: &Self) -> Self {
-        let filter = first.presentation.filter.unwrap_or(Level::Published);
-        let chain = Chain::new(Arc::clone(&first.method), filter, Arc::clone(&then.method));
-        let parts = [&first.fingerprint, &then.fingerprint];
-        // A chain is as external as its parts: an edited script is a new version of it.
-        let fingerprint = parts
-            .iter()
-            .any(|part| part.is_some())
-            .then(|| parts.map(|part| part.as_deref().unwrap_or("built in")).join(" + "));
-        let registered = Registered::from(chain).sweep(&then.presentation.sweep);
-        let version = first.version.as_ref().zip(then.version.as_ref());
-        let version = version.map(|(first, then)| format!("{filter:?} {first} + {then}"));
-        Self { version, ..Self::new(registered, fingerprint) }
-    }
-
     /// A hash that changes whenever the results of the method may. `binary` is the hash of the running
     /// program, which replaces the version of a built-in method without one.
     pub fn version(&self, binary: &str) -> String {
@@ -125,7 +109,7 @@ impl Registry {
         let mut initial = Entry::new(initial::method().into(), None);
         initial.version = medial_methods::version(INITIAL);
         let given = Entry::new(crate::study::external::method().into(), None);
-        let (entries, others) = (Vec::new(), vec![initial, given]);
+        let (entries, others) = (Vec::new(), [initial, given]);
         let (files, remarks) = (Vec::new(), Vec::new());
         let mut registry = Self { entries, others, files, loader: None, remarks };
         for registered in methods {
@@ -133,7 +117,7 @@ impl Registry {
             if registry.entry(id).is_some() {
                 return Err(format!("two methods have the id `{id}`; change one of them"));
             }
-            registry.add(Entry::new(registered, None));
+            registry.entries.push(Entry::new(registered, None));
         }
         Ok(registry)
     }
@@ -168,22 +152,12 @@ impl Registry {
                 })
                 .collect()
         };
-        new.into_iter().for_each(|entry| self.add(entry));
+        self.entries.extend(new);
         self.files.push(file);
         Ok(())
     }
 
-    /// Adds a method, and its chains with the methods added before.
-    fn add(&mut self, new: Entry) {
-        // Both orders: which of two is the filter is decided by the user.
-        for other in &self.entries {
-            self.others.push(Entry::chain(other, &new));
-            self.others.push(Entry::chain(&new, other));
-        }
-        self.entries.push(new);
-    }
-
-    /// The method with an id, the chain of two (`FIRST+THEN`), [`INITIAL`] or [`GIVEN`](medial_run::item::GIVEN).
+    /// The method with an id, [`INITIAL`] or [`GIVEN`](medial_run::item::GIVEN).
     pub fn entry(&self, id: &str) -> Option<&Entry> {
         self.entries.iter().chain(&self.others).find(|entry| entry.id() == id)
     }
@@ -194,7 +168,7 @@ impl Registry {
         super::no_such_method(id, &known)
     }
 
-    /// All methods, without chains and the initial medial mesh.
+    /// All methods, without the initial medial mesh and external results.
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }

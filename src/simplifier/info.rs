@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::simplifier::{Level, MedialSimplifier, SimplifyError};
+use crate::simplifier::{MedialSimplifier, SimplifyError};
 
 /// Text of a method's description: a literal in code, owned where it was read from a file.
 type Text = Cow<'static, str>;
@@ -42,10 +42,10 @@ pub struct MethodInfo {
     pub incremental: bool,
     /// Whether results depend on [`RunContext::seed`](crate::simplifier::RunContext::seed).
     pub seeded: bool,
-    /// Whether there is one result for each shape, at [`Level::Published`]
+    /// Whether there is one result for each shape, at [`Level::Published`](super::Level::Published)
     /// alone.
     pub fixed: bool,
-    /// Meaning of [`Level::Published`] here.
+    /// Meaning of [`Level::Published`](super::Level::Published) here.
     pub published: Text,
     /// Parameters, in the order of the paper.
     pub params: Vec<ParamInfo>,
@@ -207,9 +207,6 @@ pub struct Presentation {
     /// Native levels of a default comparison, from fine to coarse, in the unit of
     /// [`MethodInfo::native`]; empty for a method without one.
     pub sweep: Vec<f64>,
-    /// For a method that keeps a part of the medial axis as it is: the default level from which
-    /// another method continues in a chain.
-    pub filter: Option<Level>,
     /// Whether it runs only when named, because it takes long.
     pub on_request: bool,
 }
@@ -230,12 +227,6 @@ impl Registered {
     /// With [`Presentation::sweep`], from fine to coarse.
     pub fn sweep(mut self, levels: &[f64]) -> Self {
         self.presentation.sweep = levels.to_vec();
-        self
-    }
-
-    /// With [`Presentation::filter`].
-    pub fn filter(mut self, level: Level) -> Self {
-        self.presentation.filter = Some(level);
         self
     }
 
