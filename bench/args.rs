@@ -175,11 +175,6 @@ pub fn positive(text: &str) -> Result<f64, String> {
     number(text, |x| x > 0.0, "a positive number")
 }
 
-/// Reads a fraction from 0 on.
-pub fn share(text: &str) -> Result<f64, String> {
-    number(text, |x| x >= 0.0, "a non-negative fraction, for example 0.05")
-}
-
 /// Reads a positive fraction of at most 1.
 pub fn fraction(text: &str) -> Result<f64, String> {
     number(text, |x| x > 0.0 && x <= 1.0, "a number above 0 and at most 1")

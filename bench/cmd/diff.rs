@@ -6,11 +6,11 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use medial_reports::diff::{Diff, DiffOptions, Meaning};
+use medial_reports::diff::{Diff, Meaning};
 use medial_run::item::Item;
 use medial_run::record::Record;
 
-use crate::args::{Global, share};
+use crate::args::Global;
 use crate::exec::Supervisor;
 use crate::exec::queue::{Build, Contender, run_items};
 use crate::exit::{Exit, Failure};
@@ -41,15 +41,6 @@ pub struct Arguments {
     /// Time each item N times.
     #[arg(long, value_name = "N", default_value_t = 10, requires = "run")]
     repeat: usize,
-    /// Report an increase of an error by more than this fraction.
-    #[arg(long, value_name = "FRACTION", value_parser = share, default_value_t = DiffOptions::default().error)]
-    error: f64,
-    /// Report an increase of memory by more than this fraction.
-    #[arg(long, value_name = "FRACTION", value_parser = share, default_value_t = DiffOptions::default().memory)]
-    memory: f64,
-    /// Report an increase of a method's CPU seconds by more than this fraction.
-    #[arg(long, value_name = "FRACTION", value_parser = share, default_value_t = DiffOptions::default().seconds)]
-    seconds: f64,
 }
 
 /// Runs the verb. Fails when the records of a side cannot be read, or with `--run` a program is not a build of this
@@ -67,13 +58,7 @@ pub fn run(
         false => [some_records(&arguments.old, global)?, some_records(&arguments.new, global)?],
     };
     let names = [&arguments.old, &arguments.new].map(|path| path.display().to_string());
-    let options = DiffOptions {
-        error: arguments.error,
-        memory: arguments.memory,
-        seconds: arguments.seconds,
-        alternating: arguments.run,
-    };
-    let diff = Diff::new(names, &old, &new, options);
+    let diff = Diff::new(names, &old, &new, arguments.run);
     let markdown = diff.to_markdown();
     // Without `--run` both folders belong to the user: nothing is written there.
     if arguments.run {

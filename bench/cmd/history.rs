@@ -7,7 +7,7 @@ use medial_reports::history::{Findings, Run, read_runs};
 use medial_run::journal::read_records;
 use serde_json::{json, to_value};
 
-use crate::args::{Global, positive};
+use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::output::{note, print_json, print_markdown};
 use crate::store::RESULTS;
@@ -25,14 +25,11 @@ pub struct Arguments {
     /// Set the date of the commit, as printed by `git show -s --format=%cI`.
     #[arg(long, value_name = "DATE", requires = "add")]
     date: Option<String>,
-    /// Ignore changes of seconds below this fraction.
-    #[arg(long, value_name = "SHARE", value_parser = positive, default_value_t = 0.05)]
-    least_step: f64,
 }
 
 /// Runs the verb. Fails when the results or the history cannot be read, or the run cannot be added.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
-    let Arguments { folder, least_step, .. } = arguments;
+    let folder = &arguments.folder;
     let (added, mut warnings) = add(arguments)?;
     let (runs, damaged) = read_runs(folder)?;
     warnings.extend(damaged.iter().map(|error| format!("skipped: {error}")));
@@ -41,7 +38,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         let message = format!("{}: {why}", folder.display());
         return Err(Failure { code: Exit::NothingMeasured, message });
     }
-    let findings = Findings::of(&runs, *least_step);
+    let findings = Findings::of(&runs);
     if global.json {
         let mut object = to_value(&findings).map_err(Failure::input)?;
         object["added"] = json!(added);

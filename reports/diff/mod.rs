@@ -20,24 +20,8 @@ use serde_json::Value;
 
 pub use timing::Timing;
 
-/// Thresholds beyond which a change for the worse is a regression, all as fractions.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct DiffOptions {
-    /// Errors.
-    pub error: f64,
-    /// Peak of memory.
-    pub memory: f64,
-    /// CPU seconds of a method over all meshes; twice as much on a single mesh.
-    pub seconds: f64,
-    /// Whether repetition `k` of both sides ran in direct succession, so that they are compared in pairs.
-    pub alternating: bool,
-}
-
-impl Default for DiffOptions {
-    fn default() -> Self {
-        Self { error: 0.005, memory: 0.05, seconds: 0.05, alternating: false }
-    }
-}
+/// A larger increase of CPU seconds, as a share, is a regression; of a method on a single mesh, twice as much.
+pub(crate) const LEAST_SLOWDOWN: f64 = 0.05;
 
 /// The direction of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -110,8 +94,8 @@ pub struct Unlike {
 pub struct Diff {
     /// The older and the newer one.
     pub sides: [Side; 2],
-    /// The thresholds.
-    pub options: DiffOptions,
+    /// Whether repetition `k` of both sides ran in direct succession, so that they are compared in pairs.
+    pub alternating: bool,
     /// Pairs that were compared.
     pub compared: usize,
     /// Number of meshes that each method was compared on.
@@ -133,18 +117,17 @@ pub struct Diff {
 
 impl Diff {
     /// Compares an older and a newer set of records, named as given. Of several records of one result the last one
-    /// counts. The same records give the same difference.
-    pub fn new(names: [String; 2], old: &[Record], new: &[Record], options: DiffOptions) -> Self {
+    /// counts. The same records give the same difference. `alternating` is [`Diff::alternating`].
+    pub fn new(names: [String; 2], old: &[Record], new: &[Record], alternating: bool) -> Self {
         let Pairs { both, missing, added, unlike } = Pairs::new(old, new);
-        let mut changes: Vec<Change> =
-            both.iter().flat_map(|pair| results::changes(pair, &options)).collect();
+        let mut changes: Vec<Change> = both.iter().flat_map(results::changes).collect();
         // Stable: within one meaning the order of the pairs remains.
         changes.sort_by_key(|change| change.meaning);
-        let (timings, untimed) = timing::timings(&both, &options);
+        let (timings, untimed) = timing::timings(&both, alternating);
         let [first, second] = names; // as given, older first
         Self {
             sides: [side(first, old), side(second, new)],
-            options,
+            alternating,
             compared: both.len(),
             meshes: meshes_of(both.iter().map(|pair| &pair.item)),
             missing,

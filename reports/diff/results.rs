@@ -10,7 +10,7 @@ use medial_run::record::Record;
 use medial_run::text::printable;
 use serde_json::Value;
 
-use super::{Change, DiffOptions, ItemName, Meaning, Unlike};
+use super::{Change, ItemName, Meaning, Unlike};
 use crate::comparison::{level_label, row_name};
 use crate::metric::METRICS;
 
@@ -111,6 +111,12 @@ fn differences(old: &Settings, new: &Settings) -> String {
     lines.collect::<Vec<_>>().join("; ")
 }
 
+/// A larger increase of an error, as a share, is a regression.
+const LARGER_ERROR: f64 = 0.005;
+
+/// A larger increase of the peak of memory, as a share, is a regression.
+const LARGER_MEMORY: f64 = 0.05;
+
 /// Errors below this share of the diagonal are rounding.
 const NEGLIGIBLE: f64 = 1e-9;
 
@@ -127,9 +133,9 @@ const BOUNDED: &str = "simplify.spheres within the error";
 pub(crate) type Facts = BTreeMap<String, Value>;
 
 /// The changes from one record to the other. Time linear in the length of the records.
-pub(super) fn changes(pair: &Pair<'_>, options: &DiffOptions) -> Vec<Change> {
+pub(super) fn changes(pair: &Pair<'_>) -> Vec<Change> {
     let expected = [pair.old, pair.new].map(expected_betti);
-    let mut changes = compare(&pair.item, [facts(pair.old), facts(pair.new)], expected, options);
+    let mut changes = compare(&pair.item, [facts(pair.old), facts(pair.new)], expected);
     // With several threads memory is not quite the same each time: within its threshold it is not listed.
     changes.retain(|change: &Change| change.what != MEMORY || change.meaning != Meaning::Changed);
     changes
@@ -140,7 +146,6 @@ pub(crate) fn compare(
     item: &ItemName,
     [old, mut new]: [Facts; 2],
     expected: [Value; 2],
-    options: &DiffOptions,
 ) -> Vec<Change> {
     let mut changes = vec![];
     let mut add = |what: String, old: Value, new: Value| {
@@ -148,7 +153,7 @@ pub(crate) fn compare(
             (Some(old), Some(new)) if old != 0.0 => Some((new - old) / old.abs()),
             _ => None,
         };
-        let meaning = meaning(&what, [&old, &new], &expected, options);
+        let meaning = meaning(&what, [&old, &new], &expected);
         changes.push(Change { item: item.clone(), what, old, new, relative, meaning });
     };
     for (what, old) in old {
@@ -163,21 +168,16 @@ pub(crate) fn compare(
 }
 
 /// The direction of a quantity's change.
-fn meaning(
-    what: &str,
-    [old, new]: [&Value; 2],
-    expected: &[Value; 2],
-    options: &DiffOptions,
-) -> Meaning {
+fn meaning(what: &str, [old, new]: [&Value; 2], expected: &[Value; 2]) -> Meaning {
     let key = what.strip_prefix("evaluate.").unwrap_or(what);
     let is_ok = |status: &Value| ["ok", "external"].iter().any(|ok| status == ok);
     match key {
         "status" => of_truth(is_ok(old), is_ok(new)),
         "betti" | "union.betti" => of_truth(*old == expected[0], *new == expected[1]),
-        MEMORY => of_size(old, new, options.memory, LEAST_MEMORY),
+        MEMORY => of_size(old, new, LARGER_MEMORY, LEAST_MEMORY),
         BOUNDED => of_size(old, new, 0.0, 0.5),
         key if METRICS.iter().any(|metric| metric.is_gate && metric.path == key) => {
-            of_size(old, new, options.error, NEGLIGIBLE)
+            of_size(old, new, LARGER_ERROR, NEGLIGIBLE)
         }
         _ => Meaning::Changed,
     }

@@ -6,7 +6,7 @@ use medial_run::text::{counted, significant};
 use serde_json::Value;
 
 use super::results::MEMORY;
-use super::{Change, Diff, ItemName, Meaning, Unlike};
+use super::{Change, Diff, ItemName, LEAST_SLOWDOWN, Meaning, Unlike};
 use crate::metric::METRICS;
 use crate::tables::{Cell, Table, escape, left_out, to_markdown};
 
@@ -195,8 +195,7 @@ fn timing_table(diff: &Diff) -> Table {
             Some(Meaning::Improvement) => Cell { best: true, ..Cell::from("faster") },
             _ => Cell::from(""),
         });
-    let options = &diff.options;
-    let together = match options.alternating {
+    let together = match diff.alternating {
         true => "Both builds ran alternately.",
         false => {
             "The two did not run alternately: a machine that was busier on one of the two occasions looks like a \
@@ -207,8 +206,8 @@ fn timing_table(diff: &Diff) -> Table {
         "The methods' own seconds, without shared substrates. Slower or faster: the whole interval is beyond {:.0} % of \
          CPU seconds ({:.0} % on a single mesh), the fastest repetitions differ by as much, and nine of ten repetitions \
          agree. All intervals hold together with a probability of 99 %. {together}",
-        100.0 * options.seconds,
-        200.0 * options.seconds // one mesh has fewer results to average
+        100.0 * LEAST_SLOWDOWN,
+        200.0 * LEAST_SLOWDOWN // one mesh has fewer results to average
     );
     Table { caption: "Seconds".to_owned(), notes: vec![note], ..rows.table }
 }

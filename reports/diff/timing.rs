@@ -24,7 +24,7 @@ use medial_run::record::{Record, Stages};
 use serde::Serialize;
 
 use super::results::Pair;
-use super::{DiffOptions, ItemName, Meaning};
+use super::{ItemName, LEAST_SLOWDOWN, Meaning};
 use crate::metric::median;
 
 /// With fewer repetitions seconds are not compared.
@@ -76,7 +76,7 @@ struct Group<'p, 'a> {
 
 /// A row for each method over all meshes, and rows for single meshes with a regression or an
 /// improvement. And the reasons why some seconds were not compared.
-pub(super) fn timings(pairs: &[Pair<'_>], options: &DiffOptions) -> (Vec<Timing>, Vec<String>) {
+pub(super) fn timings(pairs: &[Pair<'_>], alternating: bool) -> (Vec<Timing>, Vec<String>) {
     let mut untimed = Vec::new(); // reasons, in the order of the checks
     let timed: Vec<&Pair<'_>> = pairs.iter().filter(|pair| alike(pair)).collect();
     if timed.len() < pairs.len() {
@@ -98,7 +98,7 @@ pub(super) fn timings(pairs: &[Pair<'_>], options: &DiffOptions) -> (Vec<Timing>
     }
     let groups = groups(&repeated);
     let error_rate = ERROR_RATE / groups.len() as f64;
-    let rows = groups.iter().filter_map(|group| group.timing(options, error_rate));
+    let rows = groups.iter().filter_map(|group| group.timing(alternating, error_rate));
     // Rows of single meshes without a finding would bury the others.
     (rows.filter(|row| row.mesh.is_none() || row.meaning.is_some()).collect(), untimed)
 }
@@ -164,7 +164,7 @@ fn seconds(record: &Record, part: Part) -> Vec<f64> {
 
 impl Group<'_, '_> {
     /// The row; `None` where all times are too short.
-    fn timing(&self, options: &DiffOptions, error_rate: f64) -> Option<Timing> {
+    fn timing(&self, alternating: bool, error_rate: f64) -> Option<Timing> {
         // For each pair the seconds of the repetitions of both sides, where these take long enough.
         let mut pairs: Vec<[Vec<f64>; 2]> = (self.pairs.iter())
             .map(|pair| [pair.old, pair.new].map(|record| seconds(record, self.part)))
@@ -184,10 +184,10 @@ impl Group<'_, '_> {
         });
         let least = |seconds: &[f64]| seconds.iter().copied().fold(f64::INFINITY, f64::min);
         let fastest = mean_logarithm(1, &least) - mean_logarithm(0, &least);
-        let shift = Shift::new(&old, &new, options.alternating, error_rate);
+        let shift = Shift::new(&old, &new, alternating, error_rate);
         let Shift { mean, interval, agreement } = shift;
         let alone = if self.mesh.is_some() { 2.0 } else { 1.0 };
-        let threshold = (alone * options.seconds).ln_1p();
+        let threshold = (alone * LEAST_SLOWDOWN).ln_1p();
         let evidence = [interval[0], interval[1], fastest];
         let meaning = if agreement < AGREEMENT {
             None

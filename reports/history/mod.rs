@@ -21,7 +21,7 @@ pub use run::{Point, Run, read_runs};
 
 use crate::diff::results::compare;
 use crate::diff::text::headline;
-use crate::diff::{Change, DiffOptions, ItemName, Meaning, items, meshes_of};
+use crate::diff::{Change, ItemName, LEAST_SLOWDOWN, Meaning, items, meshes_of};
 use crate::metric::median;
 
 /// A change point that is found one run later may lie this many runs from its earlier place.
@@ -97,8 +97,8 @@ pub struct Findings<'a> {
 const FEWEST: usize = 3;
 
 impl<'a> Findings<'a> {
-    /// Findings in runs, the oldest first. `least_step` is the least change of seconds, as a share.
-    pub fn of(runs: &'a [Run], least_step: f64) -> Self {
+    /// Findings in runs, the oldest first.
+    pub fn of(runs: &'a [Run]) -> Self {
         let mut tracks: BTreeMap<_, Track<'a>> = BTreeMap::new();
         for (index, run) in runs.iter().enumerate() {
             for point in &run.series {
@@ -120,8 +120,7 @@ impl<'a> Findings<'a> {
             change_points: vec![],
             changes: vec![],
         };
-        let steps: Vec<_> =
-            (0..findings.tracks.len()).map(|track| findings.steps(track, least_step)).collect();
+        let steps: Vec<_> = (0..findings.tracks.len()).map(|track| findings.steps(track)).collect();
         // Series of a method find one step some runs apart: it is news once.
         let earlier: Vec<_> = steps.iter().flat_map(|(_, earlier)| earlier.clone()).collect();
         findings.change_points = steps.into_iter().flat_map(|(steps, _)| steps).collect();
@@ -172,7 +171,7 @@ impl<'a> Findings<'a> {
     }
 
     /// The change points of seconds, and those that were known before the newest run: track, run, and whether slower.
-    fn steps(&self, track: usize, least: f64) -> (Vec<DatedChange>, Vec<(usize, usize, bool)>) {
+    fn steps(&self, track: usize) -> (Vec<DatedChange>, Vec<(usize, usize, bool)>) {
         let measured = measured(&self.tracks[track]);
         let values: Vec<f64> = measured.iter().map(|(_, value)| *value).collect();
         let Some((&(newest, last), before)) = measured.split_last() else {
@@ -180,7 +179,7 @@ impl<'a> Findings<'a> {
         };
         let is_newest = newest + 1 == self.runs.len();
         let known = if is_newest { before.len() } else { values.len() };
-        let earlier = change_points(&values[..known], least);
+        let earlier = change_points(&values[..known], LEAST_SLOWDOWN);
         let earlier = earlier.iter().map(|step| (track, measured[step.at].0, step.ratio > 1.0));
         let change = |step: ChangePoint| {
             let [before, after] = [measured[step.at - 1], measured[step.at]];
@@ -202,7 +201,7 @@ impl<'a> Findings<'a> {
                 ..self.dated(change, [before.0, after.0])
             }
         };
-        let steps = change_points(&values, least).into_iter().map(change).collect();
+        let steps = change_points(&values, LEAST_SLOWDOWN).into_iter().map(change).collect();
         (steps, earlier.collect())
     }
 
@@ -224,7 +223,7 @@ impl<'a> Findings<'a> {
             let [(before, old), (after, new)] = [pair[0], pair[1]];
             let expected = [old, new].map(|point| point.expected_betti.clone());
             let gates = [old, new].map(|point| point.gates.clone());
-            let changes = compare(&item(new), gates, expected, &DiffOptions::default());
+            let changes = compare(&item(new), gates, expected);
             found.extend(changes.into_iter().map(|change| DatedChange {
                 news: after + 1 == self.runs.len(),
                 ..self.dated(change, [before, after])

@@ -1,6 +1,6 @@
 //! The difference of two sets of records: regressions, listed changes, ignored noise.
 
-use medial_reports::diff::{Diff, DiffOptions, Meaning};
+use medial_reports::diff::{Diff, Meaning};
 use medial_run::record::{Record, Repetition, Stages};
 
 use super::common::{self, SHAPES, comparison};
@@ -8,8 +8,7 @@ use super::common::{self, SHAPES, comparison};
 const METHODS: [&str; 3] = ["qmat", "angle", "lambda"];
 
 fn diff(old: &[Record], new: &[Record]) -> Diff {
-    let options = DiffOptions { alternating: true, ..DiffOptions::default() };
-    Diff::new(["before".into(), "after".into()], old, new, options)
+    Diff::new(["before".into(), "after".into()], old, new, true)
 }
 
 /// Records with ten repetitions, each with a noise of some share of its seconds, on a machine whose load in the moment
@@ -70,10 +69,10 @@ fn busy(seed: usize, repetitions: usize, factor: f64) -> Vec<Record> {
 #[test]
 fn a_slow_build_is_a_regression_and_a_busy_machine_is_not() {
     let silent = |alternating| {
-        let options = DiffOptions { alternating, ..DiffOptions::default() };
         let names = || ["before".to_owned(), "after".to_owned()];
         (0..200).all(|seed| {
-            let diff = Diff::new(names(), &busy(seed, 5, 1.0), &busy(seed + 1000, 5, 1.0), options);
+            let diff =
+                Diff::new(names(), &busy(seed, 5, 1.0), &busy(seed + 1000, 5, 1.0), alternating);
             diff.count(Meaning::Regression) + diff.count(Meaning::Improvement) == 0
         })
     };

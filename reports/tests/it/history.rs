@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use medial_reports::diff::{Diff, DiffOptions, Meaning};
+use medial_reports::diff::{Diff, Meaning};
 use medial_reports::history::{Findings, Run, read_runs};
 use medial_run::level::Target;
 use medial_run::record::{Record, Repetition, Stages, Status};
@@ -177,7 +177,7 @@ fn a_change_point_is_reported_once_with_its_commits() {
             *seconds *= 1.2;
         }
     });
-    let findings = Findings::of(&runs, 0.05);
+    let findings = Findings::of(&runs);
     assert_eq!((findings.change_points.len(), findings.changes.len()), (2, 0));
     for change in &findings.change_points {
         let item = &change.change.item;
@@ -200,14 +200,14 @@ fn a_change_point_is_reported_once_with_its_commits() {
             }
         });
         let news: Vec<usize> =
-            (25..=50).map(|count| Findings::of(&runs[..count], 0.05).regressions).collect();
+            (25..=50).map(|count| Findings::of(&runs[..count]).regressions).collect();
         assert_eq!(
             (news.iter().sum::<usize>(), news[9..14].iter().sum::<usize>()),
             (1, 1),
             "{news:?}"
         );
         let night = 25 + news.iter().position(|&count| count == 1).expect("an alarm");
-        let text = Findings::of(&runs[..night], 0.05).to_markdown();
+        let text = Findings::of(&runs[..night]).to_markdown();
         let words = if factor == 5.7 { " times slower on box" } else { " % slower on box" };
         let first = text.lines().next().expect("a line");
         assert!(first.starts_with("# pmat ") && first.ends_with(words), "{first}");
@@ -221,14 +221,14 @@ fn a_step_of_most_series_is_attributed_to_the_machine() {
         // Beyond that, one method is slower by itself.
         *seconds *= if run >= 30 && record.simplify.method == "angle" { 1.5 } else { 1.0 };
     });
-    let findings = Findings::of(&runs, 0.05);
+    let findings = Findings::of(&runs);
     assert_eq!(findings.change_points.len(), 16);
     for change in &findings.change_points {
         assert_eq!(change.shared, change.change.item.method != "angle", "{change:?}");
     }
     assert!(findings.to_markdown().contains("the machine"));
     for count in 31..=50 {
-        let findings = Findings::of(&runs[..count], 0.05);
+        let findings = Findings::of(&runs[..count]);
         assert!(findings.news().all(|change| change.change.item.method == "angle"), "{count}");
     }
 }
@@ -246,7 +246,7 @@ fn exact_values_change_after_one_run() {
             record.result_hash = Some("e".repeat(64));
         }
     });
-    let findings = Findings::of(&runs, 0.05);
+    let findings = Findings::of(&runs);
     let found: Vec<(usize, &str, Meaning)> = (findings.changes.iter())
         .map(|dated| (dated.run, &*dated.change.what, dated.change.meaning))
         .collect();
@@ -305,20 +305,19 @@ fn a_history_counts_as_its_difference_does() {
             })
         };
         let [old, new] = [night(0), night(1)];
-        let difference =
-            Diff::new(["old".into(), "new".into()], &old, &new, DiffOptions::default());
+        let difference = Diff::new(["old".into(), "new".into()], &old, &new, false);
         let mut runs: Vec<Run> =
             [&old, &new, &new].into_iter().enumerate().map(|(k, r)| run_of(r, k)).collect();
-        let again = Findings::of(&runs, 0.05);
+        let again = Findings::of(&runs);
         assert_eq!((again.regressions, again.headline.as_deref()), (0, None), "{first}");
         runs.pop();
-        let findings = Findings::of(&runs, 0.05);
+        let findings = Findings::of(&runs);
         assert_eq!(findings.regressions, difference.count(Meaning::Regression), "{first}");
         assert_eq!(findings.regressions, if first.contains("qmat") { 2 } else { 0 });
         for text in [findings.to_markdown(), difference.to_markdown()] {
             assert!(text.starts_with(first), "{first}: {text}");
         }
-        let text = Findings::of(&runs[..1], 0.05).to_markdown();
+        let text = Findings::of(&runs[..1]).to_markdown();
         assert!(text.starts_with("# First run, nothing to compare\n"), "{text}");
     }
 }
@@ -333,7 +332,7 @@ fn alternating_machines_are_compared_separately() {
         }
         *seconds *= if run >= 40 && record.simplify.method == "hem" { 1.3 } else { 1.0 };
     });
-    let findings = Findings::of(&runs, 0.05);
+    let findings = Findings::of(&runs);
     assert!(findings.changes.is_empty());
     let places: Vec<usize> = findings.change_points.iter().map(|change| change.run).collect();
     assert_eq!(places, [42, 42, 42, 42, 40, 40, 40, 40]);
