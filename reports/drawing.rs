@@ -50,8 +50,6 @@ pub struct Drawing {
     pub camera: Option<View>,
     /// Upward direction; `None` for `y`, or `z` for shapes that are flat along `y`.
     pub up: Option<Upward>,
-    /// Factor of enlargement; 1 fills the picture.
-    pub zoom: f64,
     /// Width and height of each panel in pixels.
     pub size: [usize; 2],
     /// The background.
@@ -198,13 +196,12 @@ impl Drawing {
     /// The camera of the options, or the one that shows most of the surface.
     fn camera(&self, surface: &TriMesh) -> Camera {
         let up = || self.up.map_or_else(|| Camera::fitting_up(surface), |up| up.0);
-        let camera = match (self.camera, self.up) {
+        match (self.camera, self.up) {
             (None, None) => Camera::fitting(surface),
             (None, Some(up)) => Camera::around(up.0, 28.0, 20.0),
             (Some(View::Angles(azimuth, elevation)), _) => Camera::around(up(), azimuth, elevation),
             (Some(View::Direction(direction)), _) => Camera::new(direction, up()),
-        };
-        Camera { zoom: self.zoom, ..camera }
+        }
     }
 }
 

@@ -40,9 +40,6 @@ pub struct Arguments {
     /// along `y`].
     #[arg(long, value_name = "DIRECTION", allow_hyphen_values = true)]
     up: Option<Upward>,
-    /// Enlarge the shape by this factor; 1 fills the picture.
-    #[arg(long, default_value_t = 1.0)]
-    zoom: f64,
     /// Set the pixels of each panel.
     #[arg(long, value_name = "WxH", default_value = "800x600", value_parser = size)]
     size: [usize; 2],
@@ -87,7 +84,7 @@ fn colour() -> impl TypedValueParser<Value = ColourBy> {
 /// Runs the verb. Fails when an input is refused, an option is invalid, or the picture cannot be written.
 pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     // All options are checked before the first file is read.
-    let Arguments { output, show, color, camera, up, zoom, size, background, .. } = arguments;
+    let Arguments { output, show, color, camera, up, size, background, .. } = arguments;
     check_extension(output, &["png"])?;
     check_folder(output)?;
     let drawing = Drawing {
@@ -95,7 +92,6 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         colour: *color,
         camera: *camera,
         up: *up,
-        zoom: *zoom,
         size: *size,
         background: *background,
         max_error: arguments.max_error,

@@ -67,7 +67,6 @@ def render(
     color: Literal["radius", "plain"] = "radius",
     camera: str | Sequence[float] | None = None,
     up: str | Sequence[float] | None = None,
-    zoom: float = 1.0,
     size: tuple[int, int] = (800, 600),
     background: str = "white",
     max_error: float | None = None,
@@ -87,7 +86,6 @@ def render(
         camera: `front`, `back`, `left`, `right`, `top`, `bottom`, `iso`; azimuth and elevation in degrees; or the direction
             from the shape to the eye. By default the direction that shows most of the shape.
         up: `x`, `y`, `z`, `-x`, `-y`, `-z`, or a direction.
-        zoom: Factor of enlargement; 1 fills the picture.
         size: Width and height of each panel, in pixels.
         background: `white`, `black`, `transparent` or `#rrggbb`.
         max_error: End of the scale of errors, a fraction of the diagonal.
@@ -129,7 +127,6 @@ def render(
         "color": color,
         "camera": None if camera is None else _word(camera),
         "up": None if up is None else _word(up),
-        "zoom": real(zoom, "zoom"),
         "size": [whole(side, "size", 0, 2**32 - 1) for side in size],
         "background": background,
         "max_error": None if max_error is None else real(max_error, "max_error"),

@@ -39,8 +39,8 @@ def test_a_picture_is_that_of_the_command(blob: Mesh, axis: MedialAxis, tmp_path
 
 
 def test_options_of_a_picture(blob: Mesh, axis: MedialAxis) -> None:
-    assert render(blob, up="-x", background="#102030", zoom=2, camera=[1, 0, 0.5]).up[0] < 0
-    for words in ({"show": "all"}, {"camera": "upside"}, {"size": (0, 3)}, {"size": 7}, {"color": 3}, {"zoom": "x"}):
+    assert render(blob, up="-x", background="#102030", camera=[1, 0, 0.5]).up[0] < 0
+    for words in ({"show": "all"}, {"camera": "upside"}, {"size": (0, 3)}, {"size": 7}, {"color": 3}, {"max_error": "x"}):
         with pytest.raises(ParameterError, match=next(iter(words))):
             render(blob, **words)  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match="show"):

@@ -1,6 +1,6 @@
 //! Where the picture is taken from, and how points are projected onto it.
 //!
-//! A [`Camera`] is a direction, an upward direction and a zoom. A [`Frame`] is a camera that was set up before a shape:
+//! A [`Camera`] is a direction and an upward direction. A [`Frame`] is a camera that was set up before a shape:
 //! the part of its plane that fills the picture. Projection is orthographic: lengths compare across the picture.
 
 use medial::Vec3;
@@ -16,12 +16,7 @@ pub(crate) struct Camera {
     pub(crate) direction: Vec3,
     /// Upward direction on the picture, not parallel to the viewing direction.
     pub(crate) up: Vec3,
-    /// 1: the shape fills the picture; 2: twice as large.
-    pub(crate) zoom: f64,
 }
-
-/// Accepted zooms: coordinates on the picture must stay in the range of exact arithmetic.
-const ZOOMS: std::ops::RangeInclusive<f64> = 0.05..=50.0;
 
 /// Below this ratio of the principal box's volume to the coordinate box's the shape is rotated. Above it the
 /// coordinates of the file give the better upright position.
@@ -37,7 +32,7 @@ const MARGIN: f64 = 0.04;
 impl Camera {
     /// A camera in a direction of the shape.
     pub(crate) fn new(direction: Vec3, up: Vec3) -> Self {
-        Self { direction, up, zoom: 1.0 }
+        Self { direction, up }
     }
 
     /// The camera that shows most of a shape: it looks along its shortest extent, from the side and from above. Extents
@@ -143,21 +138,17 @@ pub(crate) struct Frame {
     middle: [f64; 3],
     /// Half their extents along `right` and `up`.
     half: [f64; 2],
-    zoom: f64,
 }
 
 impl Frame {
     /// Sets a camera up so that points fill the picture. Cost linear in their number.
     pub(crate) fn fit(camera: &Camera, points: &[Vec3]) -> Result<Self, RenderError> {
-        let &Camera { direction, up, zoom } = camera;
+        let &Camera { direction, up } = camera;
         let back = direction.try_normalize().ok_or(RenderError::Direction(words(direction)))?;
         // Nearly along the line of sight, rounding would decide the upward direction.
         let across = up.try_normalize().map_or(Vec3::ZERO, |up| up.cross(back));
         if across.length() < 1e-3 {
             return Err(RenderError::Up(words(up)));
-        }
-        if !ZOOMS.contains(&zoom) {
-            return Err(RenderError::Zoom(zoom));
         }
         let right = across.normalize();
         let up = back.cross(right);
@@ -170,7 +161,7 @@ impl Frame {
         }
         let middle = ranges.map(|(lo, hi)| 0.5 * (lo + hi));
         let half = [0, 1].map(|k: usize| 0.5 * (ranges[k].1 - ranges[k].0));
-        Ok(Self { right, up, back, middle, half, zoom })
+        Ok(Self { right, up, back, middle, half })
     }
 
     /// Pixels for a unit of the shape, on a picture of this size.
@@ -179,7 +170,7 @@ impl Frame {
         let margin = 2.0 * MARGIN * w.min(h);
         let scale = ((w - margin) / (2.0 * self.half[0])).min((h - margin) / (2.0 * self.half[1]));
         // A point has no extent: any scale shows it.
-        self.zoom * if scale.is_finite() { scale } else { 1.0 }
+        if scale.is_finite() { scale } else { 1.0 }
     }
 
     /// Points on a picture of this size, in pixels: from the left, from the top, and towards the eye.
@@ -210,7 +201,6 @@ mod tests {
         let front = Camera::new(Vec3::Z, Vec3::Y);
         assert!(matches!(fit(Camera::new(Vec3::ZERO, Vec3::Y)), Err(RenderError::Direction(_))));
         assert!(matches!(fit(Camera::new(Vec3::Y, 2.0 * Vec3::Y)), Err(RenderError::Up(_))));
-        assert_eq!(fit(Camera { zoom: 0.0, ..front }), Err(RenderError::Zoom(0.0)));
         assert_eq!(Frame::fit(&front, &[]), Err(RenderError::Empty));
     }
 

@@ -51,8 +51,6 @@ pub(crate) enum RenderError {
         "up: {0}: not an upward direction (found a line of sight, expected a direction across it)"
     )]
     Up(String),
-    #[error("zoom: a zoom of {0}: out of range (expected 0.05 to 50)")]
-    Zoom(f64),
     #[error("nothing to draw: no finite point")]
     Empty,
     #[error(
