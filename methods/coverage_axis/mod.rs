@@ -58,11 +58,13 @@ use medial::simplifier::{
 use medial::surface::{Sampling, sample};
 use serde::{Deserialize, Serialize};
 
-use crate::levels::{Knob, Probe, SizeSearch, level_within, some_spheres, within};
+use crate::levels::{Knob, Probe, SizeSearch, level_within, some_spheres};
 use crate::{Prepared, Result};
 
 /// Limit of chosen spheres in the authors' scripts.
 const PUBLISHED_PICKS: usize = 100;
+/// `delta` of the scripts, by which balls are inflated before they cover, in longest sides.
+const PUBLISHED_DILATION: f64 = 0.02;
 /// Limit of chosen spheres at a native level.
 const MAX_PICKS: usize = 1000;
 /// Area-uniform samples to be covered, as in the script of Coverage Axis++.
@@ -94,7 +96,6 @@ pub fn method() -> Method<CoverageAxisParams> {
 }
 
 fn prepare<'s>(shape: &'s Shape, params: CoverageAxisParams, run: &RunContext) -> Prepared<'s> {
-    within("dilation", params.dilation, DILATIONS)?;
     let initial = shape.initial()?;
     run.step(0, initial.spheres.len())?;
     let instance = Instance::new(shape, &initial, run.seed)?;
@@ -102,7 +103,7 @@ fn prepare<'s>(shape: &'s Shape, params: CoverageAxisParams, run: &RunContext) -
         penalties: penalties(&instance.spheres),
         instance,
         initial,
-        params,
+        select: params.select,
         run: run.clone(),
     };
     // The inverse dilation gives more spheres when it is turned up, as a search expects of a knob.
@@ -122,22 +123,21 @@ struct Axis {
     instance: Instance,
     penalties: Vec<f64>,
     initial: Arc<MedialMesh>,
-    params: CoverageAxisParams,
+    select: Select,
     run: RunContext,
 }
 
 impl Simplification for PreparedCoverage {
     fn at(&mut self, level: Level) -> Result<Simplified> {
         let Self { axis, search } = self;
-        let CoverageAxisParams { select, dilation } = axis.params;
         let (dilation, most) = match some_spheres(level)? {
-            Level::Spheres(count) if select == Select::Greedy => (dilation, count),
+            Level::Spheres(count) if axis.select == Select::Greedy => (PUBLISHED_DILATION, count),
             Level::Spheres(count) => {
                 // The search expects more spheres at larger values: it gets the inverse dilation.
                 return search.at(count, f64::recip, |value| axis.at(value.recip(), MAX_PICKS));
             }
             Level::Native(delta) => (level_within("delta", delta, DILATIONS)?, MAX_PICKS),
-            Level::Published => (dilation, PUBLISHED_PICKS),
+            Level::Published => (PUBLISHED_DILATION, PUBLISHED_PICKS),
         };
         let Probe { mesh, diagnostics } = axis.at(dilation, most)?;
         if let Level::Spheres(count) = level
@@ -161,7 +161,7 @@ impl Axis {
         diagnostics.count("candidates", spheres.len());
         diagnostics.count("candidates_too_small", *too_small);
         diagnostics.count("samples", samples.len());
-        let chosen = match self.params.select {
+        let chosen = match self.select {
             Select::Greedy => self.greedy(&coverage, most, &mut diagnostics)?,
             Select::Exact => self.exact(&coverage, &mut diagnostics)?,
         };
@@ -245,8 +245,6 @@ medial::parameters! {
         /// Choose by score, as Coverage Axis++, or a smallest cover by branch and bound, as Coverage
         /// Axis.
         select: Select = Select::Greedy, "greedy or exact";
-        /// `delta`, by which balls are inflated before they cover, where no native level is requested.
-        dilation: f64 = 0.02, "fraction of the longest side";
     }
 }
 

@@ -83,7 +83,6 @@ class CoverageAxis(Options, total=False):
     """Options of `coverage-axis`."""
 
     select: Literal["greedy", "exact"]
-    dilation: float  # fraction of the longest side
 
 
 class Vmas(Options, total=False):

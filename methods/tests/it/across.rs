@@ -15,7 +15,7 @@ fn wrong_parameters_are_refused_by_name() {
         ("dey-zhao", "theta=0 theta=90 rho=0 rho=-8"),
         ("qmat", "k=-1 k_boundary=-1 topology_from=some"),
         ("tam-heidrich", "t_v=-1 t_v=1,many t_v=[1,101] drop=2 t_t_rounds=1.5"),
-        ("coverage-axis", "dilation=0 select=all"),
+        ("coverage-axis", "select=all"),
         ("vmas", "lambda=0 lambda=1.5 iterations=0 points=faces"),
         ("tight", "lambda=-1 samples=99 rounds=1001"),
         ("cover", "mood=sad mood=1 radii=same"),
