@@ -15,7 +15,7 @@ pub enum Exit {
     Input = 1,
     /// The command line is wrong.
     Usage = 2,
-    /// Some runs failed, or with `--strict` are not as requested; the rest are reported.
+    /// Some runs failed; the rest are reported.
     SomeFailed = 3,
     /// Something became worse.
     Regression = 4,

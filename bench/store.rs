@@ -115,7 +115,7 @@ impl Store {
         let is_there = |name| artifact_path(&self.dir, name).is_some_and(|path| path.is_file());
         match (&record.artifact, record.simplify.spheres) {
             (Some(name), _) => !is_there(name),
-            (None, Some(n)) => item.keep.keeps(item, record.simplify.level, n),
+            (None, Some(n)) => item.keeps(record.simplify.level, n),
             (None, None) => false,
         }
     }

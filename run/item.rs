@@ -33,9 +33,6 @@ pub struct Item {
     pub repeat: usize,
     /// Limits of time and memory.
     pub limits: Limits,
-    /// The results that stay on disk. The default is not serialized, for workers of older builds.
-    #[serde(default, skip_serializing_if = "Keep::is_small")]
-    pub keep: Keep,
     /// The version of the method: records of other versions do not count.
     pub version: String,
     /// SHA-256 of the program that runs it, recorded only.
@@ -71,39 +68,17 @@ pub struct Limits {
     pub budget: Option<f64>,
 }
 
-/// The results that stay on disk as `.ma`. The others can be recomputed from their records.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Keep {
-    /// All results.
-    All,
-    /// Results at a count or a bound, external results, and others of at most 1,000 spheres.
-    #[default]
-    Small,
-    /// No results, and therefore no pictures.
-    None,
-}
-
-impl Keep {
-    fn is_small(&self) -> bool {
-        *self == Self::Small
-    }
-
-    /// Whether a result of an item stays on disk.
-    pub fn keeps(self, item: &Item, level: Target, spheres: usize) -> bool {
-        let is_requested = matches!(level, Target::Spheres(_) | Target::MaxError(_));
-        match self {
-            Self::All => true,
-            Self::Small => is_requested || item.method.id == GIVEN || spheres <= MOST_SMALL,
-            Self::None => false,
-        }
-    }
-}
-
 /// Most spheres of a result on disk at a native or published level.
 const MOST_SMALL: usize = 1_000;
 
 impl Item {
+    /// Whether a result stays on disk as `.ma`: external ones, those at a count or a bound, and small ones. The others
+    /// can be recomputed from their records.
+    pub fn keeps(&self, level: Target, spheres: usize) -> bool {
+        let is_requested = matches!(level, Target::Spheres(_) | Target::MaxError(_));
+        is_requested || self.method.id == GIVEN || spheres <= MOST_SMALL
+    }
+
     /// The key of one level: equal for equal work. It is independent of limits and of the number of
     /// repetitions, which do not change a result.
     pub fn key(&self, level: Target) -> String {
@@ -192,7 +167,6 @@ mod tests {
             seed: 0,
             repeat: 1,
             limits: Limits { seconds: 300.0, bytes: 1 << 30, budget: None },
-            keep: Keep::Small,
             version: "34cd".into(),
             binary: "56ef".into(),
         }
@@ -206,12 +180,11 @@ mod tests {
             changed.key(Target::Spheres(100))
         };
         let plain = key(|_| ());
-        let same: [fn(&mut Item); 6] = [
+        let same: [fn(&mut Item); 5] = [
             // A rebuild that changed no method: the page, a verb.
             |i| i.binary = "56f0".into(),
             |i| i.limits.seconds = 1.0,
             |i| i.repeat = 5,
-            |i| i.keep = Keep::All,
             |i| i.levels.clear(),
             |i| i.scene.source = Source::File("elsewhere/bear.off".into()),
         ];

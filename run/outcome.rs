@@ -106,7 +106,7 @@ pub fn record(
         }
     }
     let spheres = result.mesh.spheres.len();
-    if let Some(axes) = axes.filter(|_| item.keep.keeps(item, run.level, spheres)) {
+    if let Some(axes) = axes.filter(|_| item.keeps(run.level, spheres)) {
         match save(result, &record, scene, axes) {
             Ok(artifact) => record.artifact = Some(artifact),
             Err(error) => record.simplify.warnings.push(format!("not saved: {error}")),

@@ -4,15 +4,14 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::TypedValueParser;
 use medial_reports::{read_header, reasons};
 use medial_run::input::Source;
 use medial_run::item::GIVEN;
-use medial_run::item::{Item, Keep};
+use medial_run::item::Item;
 use medial_run::record::{Record, Status};
 use serde_json::json;
 
-use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments, word};
+use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
 use crate::exec::Supervisor;
 use crate::exec::queue::{Contender, count, missing, refused_params, run_items};
 use crate::exit::{Exit, Failure};
@@ -94,15 +93,9 @@ pub struct Arguments {
     /// Run N items at the same time; tables then omit seconds [default: 1].
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
-    /// Exit with code 3 when any result is not as requested, not only after failures.
-    #[arg(long)]
-    strict: bool,
     /// Stop an item that uses more than MB megabytes [default: 3/4 of the machine's memory, divided by the jobs].
     #[arg(long, value_name = "MB")]
     memory: Option<u64>,
-    /// Write results as `.ma` [default: small].
-    #[arg(long, value_name = "WHICH", value_parser = keep())]
-    keep: Option<Keep>,
     /// Certify each Hausdorff error by an interval of this width, as a fraction of the diagonal.
     #[arg(long, value_name = "WIDTH")]
     certify: Option<f64>,
@@ -113,14 +106,6 @@ pub struct Arguments {
     substrate: SubstrateArguments,
     #[command(flatten)]
     measure: MeasureArguments,
-}
-
-fn keep() -> impl TypedValueParser<Value = Keep> {
-    word(&[
-        ("all", "All results"),
-        ("small", "All but native levels of more than 1,000 spheres"),
-        ("none", "No results, and therefore no pictures"),
-    ])
 }
 
 /// Runs the verb. Fails when the command line or the study is wrong, an input does not exist, or the results cannot be
@@ -260,7 +245,6 @@ fn study(arguments: &Arguments, global: &Global) -> Result<Study, Failure> {
     study.budget = arguments.budget.unwrap_or(study.budget);
     study.jobs = arguments.jobs.unwrap_or(study.jobs);
     study.memory = arguments.memory.or(study.memory);
-    study.keep = arguments.keep.unwrap_or(study.keep);
     study.certify = arguments.certify.or(study.certify);
     study.spheres_alone |= arguments.spheres_alone;
     study.threads = global.threads.or(study.threads);
@@ -360,7 +344,6 @@ fn finish(
     Ok(match measured {
         0 => Exit::NothingMeasured,
         _ if records.iter().any(|record| record.status.is_failure()) => Exit::SomeFailed,
-        _ if arguments.strict && ok < records.len() => Exit::SomeFailed,
         _ => Exit::Done,
     })
 }

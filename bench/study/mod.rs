@@ -21,7 +21,7 @@ use medial::{parser_message, quoted, read_regular_text, shortened};
 use medial_run::error::InputError;
 use medial_run::hash::hex_digest;
 use medial_run::input::{Input, Source};
-use medial_run::item::{Item, Keep, Limits, MethodSpec};
+use medial_run::item::{Item, Limits, MethodSpec};
 use medial_run::level::Target;
 use medial_run::record::Provenance;
 use medial_run::scene::{Noise, SceneSpec};
@@ -113,8 +113,6 @@ pub struct Study {
     /// Limit of memory in megabytes [default: three quarters of the machine's].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub memory: Option<u64>,
-    /// Which results stay on disk.
-    pub keep: Keep,
     /// The edition, by name or folder, whose results the report has next to its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub against: Option<PathBuf>,
@@ -175,7 +173,6 @@ impl Default for Study {
             budget: BUDGET,
             jobs: 1,
             memory: None,
-            keep: Keep::default(),
             against: None,
             plugins: vec![],
             methods: vec![],
@@ -470,7 +467,6 @@ impl Study {
             seed: self.seed,
             repeat: self.repeat,
             limits: self.limits(here),
-            keep: self.keep,
             version,
             binary: here.binary_hash.clone(),
         }
