@@ -9,10 +9,10 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from . import _plugins
 from ._arguments import Progress, need, path_text
@@ -70,13 +70,11 @@ def compare(
     methods: Iterable[str | type[Any]] | str | type[Any] | None = None,
     spheres: Iterable[int] | int | None = None,
     out: str | os.PathLike[str] = "medial-report",
-    params: Mapping[str, Mapping[str, Any]] | None = None,
     timeout: float | None = None,
     budget: float | None = None,
     memory: float | None = None,
     jobs: int | None = None,
     threads: int | None = None,
-    keep: Literal["all", "small", "none"] | None = None,
     arguments: Sequence[str] = (),
     quiet: bool = False,
     progress: bool | Progress = False,
@@ -88,16 +86,14 @@ def compare(
 
     Args:
         meshes: Paths, names (`builtin:torus`) or `Mesh` objects, or one of them; by default three built-in shapes.
-        methods: Ids, or classes that `simplifier` registered; by default all but those on request.
+        methods: Ids, with parameters as in `qmat:k=0.1`, or classes that `simplifier` registered; by default all but those on request.
         spheres: Counts.
         out: The folder.
-        params: Parameters by method.
         timeout: Seconds after which an item is stopped.
         budget: Seconds on a mesh after which a method starts no further level.
         memory: Megabytes above which an item is stopped.
         jobs: Items at the same time; with several, tables omit seconds.
         threads: Threads; by default all processors.
-        keep: Results that stay on disk as `.ma`; `small`, the default, omits fine native levels.
         arguments: Further words of the command, such as `["--repeat", "3"]`.
         quiet: Print only reasons of missing results.
         progress: True shows one line that updates, on standard error or in a notebook; or a function, which is called with
@@ -131,10 +127,7 @@ def compare(
     if spheres is not None:
         counts = [spheres] if isinstance(spheres, int) else list(spheres)
         words += ["--spheres", ",".join(str(count) for count in counts)]
-    for id, values in (params or {}).items():
-        for key, value in values.items():
-            words += ["--set", f"{id}.{key}={_word(value)}"]
-    limits = {"timeout": timeout, "budget": budget, "memory": memory, "jobs": jobs, "threads": threads, "keep": keep}
+    limits = {"timeout": timeout, "budget": budget, "memory": memory, "jobs": jobs, "threads": threads}
     for name, limit in limits.items():
         if limit is not None:
             words += [f"--{name}", str(limit)]
@@ -204,10 +197,6 @@ def _files(chosen: list[str | type[Any]]) -> list[str]:
     )
     files = dict.fromkeys(file_of(cls) for cls in classes if cls is not None)
     return [word for file in files for word in ("--plugins", file)]
-
-
-def _word(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _run(words: list[str], quiet: bool, progress: Line | Progress | None) -> tuple[int, str, str]:
