@@ -143,16 +143,3 @@ fn size(text: &str) -> Result<[usize; 2], &'static str> {
     });
     sides.ok_or("expected WIDTHxHEIGHT in pixels, for example 800x600")
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sizes_are_parsed_or_refused() {
-        assert_eq!(size("800x600"), Ok([800, 600]));
-        for text in ["800", "800x", "x600", "-1x5", "800x600x2"] {
-            assert!(size(text).is_err(), "{text}");
-        }
-    }
-}

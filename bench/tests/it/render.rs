@@ -56,6 +56,8 @@ fn wrong_words_are_named_and_nothing_is_written() {
     at.write("points.ma", "2 1 0\nv 0 0 0 0\nv 0.5 0 0 0\ne 0 1\n");
     for (words, expected, part) in [
         ("--size 800", 2, "--size <WxH>': expected WIDTHxHEIGHT"),
+        ("--size=-1x5", 2, "expected WIDTHxHEIGHT"),
+        ("--size 800x600x2", 2, "expected WIDTHxHEIGHT"),
         ("--size 8x8", 2, "--size: a picture of 8 by 8"),
         ("--size 90000x10", 2, "--size: a picture of 90000 by 10"),
         ("--camera somewhere", 2, "--camera <VIEW>': expected one of front"),
