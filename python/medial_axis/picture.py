@@ -122,12 +122,16 @@ def render(
     captions = [_caption(axis) for axis in drawn] if names is None else [str(name) for name in names]
     if len(captions) != len(drawn):
         raise ParameterError(f"names: wrong number (found {len(captions)}, expected {len(drawn)})")
+    try:
+        width, height = size
+    except (TypeError, ValueError):
+        raise ParameterError(f"size: expected a width and a height, found {size!r}") from None
     options = {
         "show": show,
-        "color": color,
+        "color": str(color),
         "camera": None if camera is None else _word(camera),
         "up": None if up is None else _word(up),
-        "size": [whole(side, "size", 0, 2**32 - 1) for side in size],
+        "size": [whole(side, "size", 0, 2**32 - 1) for side in (width, height)],
         "background": background,
         "max_error": None if max_error is None else real(max_error, "max_error"),
         "tolerance": real(tolerance, "tolerance"),

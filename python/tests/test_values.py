@@ -93,7 +93,7 @@ def test_a_level_is_needed(axis: MedialAxis) -> None:
     with pytest.raises(ParameterError, match="`sphere`; did you mean `spheres`"):
         axis.simplify("qmat", sphere=100)  # type: ignore[call-overload]
     with pytest.raises(ParameterError, match="`thet`; did you mean `theta`"):
-        axis.simplify("angle", spheres=9, thet=9)  # type: ignore[call-overload]
+        axis.simplify("dey-zhao", spheres=9, thet=9)  # type: ignore[call-overload]
     with pytest.raises(ParameterError, match="one of"):
         axis.simplify("angle", spheres=9, level="published")
     assert axis.simplify("angle", level="published") == axis.simplify("angle", level=60)
