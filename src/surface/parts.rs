@@ -10,10 +10,13 @@
 //!
 //! The result does not depend on the order of faces, but for coplanar ones at one edge that are not the same.
 
+use std::cell::LazyCell;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, HashSet};
 use std::ops::ControlFlow;
 
+use super::inside::InsideTest;
+use super::mesh::Unit;
 use super::topology::{Topology, corner_at, ends, sides_by_edge, turn_over};
 use crate::Vec3;
 use crate::geometry::predicates::{Sign, orient2d, orient3d, project, projection_axis};
@@ -27,6 +30,15 @@ pub(super) struct Parted {
     /// Whether a face was turned over, by its patch.
     pub turned: Vec<bool>,
 }
+
+/// A place in a triangle, by weights of its corners, through which no other face passes by its structure.
+pub(super) const PLACE: [f64; 3] = [0.411, 0.352, 0.237];
+
+/// Distance from a triangle at which winding numbers are taken, in roots of twice its area.
+pub(super) const ASIDE: f64 = 1e-3;
+
+/// The same distance at least, in thicknesses of a wall.
+const ABOVE: f64 = 4.0;
 
 /// Limit of the faces at one edge, all of which touch each other.
 const MOST_FACES: usize = 1_000;
@@ -67,59 +79,155 @@ impl Patches {
 
 /// The faces of plane walls between bodies, no two of which are farther apart than `most`, and their largest distance.
 ///
-/// A wall is a pair of patches of opposite orientation with the same border, where other faces close the surface without
-/// them. Cut into triangles in two ways, and rounded, they enclose slivers that no one means.
-pub(super) fn walls(points: &[Vec3], faces: &[[u32; 3]], most: f64) -> (Vec<bool>, f64) {
+/// A wall is a pair of faces with the same corners and opposite orientation, or of plane patches of opposite orientation
+/// with the same border, where other faces close the surface without them; or of the same orientation, where the winding
+/// numbers of both sides have opposite signs. Cut into triangles in two ways, and rounded, they enclose slivers that no one
+/// means.
+pub(super) fn walls(
+    unit: Unit,
+    points: &[Vec3],
+    faces: &[[u32; 3]],
+    most: f64,
+) -> (Vec<bool>, f64) {
     let mut is_wall = vec![false; faces.len()];
     let mut distance = 0.0_f64;
-    let Some(Patches { faces, of, .. }) = Patches::new(points.len(), faces) else {
+    let Some(Patches { faces, .. }) = Patches::new(points.len(), faces) else {
         return (is_wall, distance);
     };
-    // For each patch its border: numbers of edges, and whether it runs up them.
-    let mut borders = BTreeMap::<u32, Vec<(u32, bool)>>::new();
-    let sides = sides_by_edge(&faces);
-    let mut left = Vec::new();
-    for group in sides.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)).filter(|group| group.len() > 2) {
-        for &(low, _, h) in group {
-            let side = (left.len() as u32, ends(&faces, h).0 == low);
-            borders.entry(of[h as usize / 3]).or_default().push(side);
+    let sheets = sheets(&faces, &mut is_wall);
+    let mut layers: Vec<Vec<usize>> = sheets.iter().map(|(_, copies)| copies.clone()).collect();
+    let sheets: Vec<[u32; 3]> = sheets.into_iter().map(|(face, _)| face).collect();
+    // For each patch of sheets its border: numbers of edges, and whether it runs up them.
+    let mut patches = DisjointSets::singletons(sheets.len());
+    let sides = sides_by_edge(&sheets);
+    let by_edge = || sides.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1));
+    for group in by_edge() {
+        if let &[(.., g), (.., h)] = group {
+            patches.join(g / 3, h / 3);
         }
-        left.push(group.len());
+    }
+    let mut borders = BTreeMap::<u32, Vec<(u32, bool)>>::new();
+    let mut left = Vec::new();
+    for group in by_edge().filter(|group| group.len() != 2) {
+        for &(low, _, h) in group {
+            let side = (left.len() as u32, ends(&sheets, h).0 == low);
+            borders.entry(patches.find(h / 3)).or_default().push(side);
+        }
+        left.push(group.iter().map(|&(.., h)| layers[h as usize / 3].len()).sum::<usize>());
     }
     let mut members = BTreeMap::<u32, Vec<usize>>::new();
-    for (face, patch) in of.iter().enumerate().filter(|(_, patch)| borders.contains_key(patch)) {
-        members.entry(*patch).or_default().push(face);
+    for sheet in 0..sheets.len() {
+        let patch = patches.find(sheet as u32);
+        if borders.contains_key(&patch) {
+            members.entry(patch).or_default().push(sheet);
+        }
     }
+    let test = LazyCell::new(|| InsideTest::of_scaled(unit, points, &faces));
+    // How many windings of opposite sign there are on both sides of a patch: bodies, one of which is inside out.
+    let opposed = |patch: u32| -> usize {
+        let corners = |&sheet: &usize| sheets[sheet].map(|v| points[v as usize]);
+        let normal = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a);
+        let faces = members[&patch].iter().map(corners);
+        let largest = faces.max_by(|&s, &t| normal(s).length().total_cmp(&normal(t).length()));
+        let [a, b, c] = largest.unwrap_or_default();
+        let aside = (ASIDE * normal([a, b, c]).length().sqrt()).max(ABOVE * most);
+        let at = PLACE[0] * a + PLACE[1] * b + PLACE[2] * c;
+        let beside = [-aside, aside].map(|by| {
+            let p = at + by * normal([a, b, c]).normalize_or_zero();
+            test.winding_of_scaled(p).unwrap_or(0)
+        });
+        let [back, front] = beside.map(i32::unsigned_abs);
+        if beside[0].signum() * beside[1].signum() < 0 { back.min(front) as usize } else { 0 }
+    };
+    let depth_of = |patch: u32, layers: &[Vec<usize>]| {
+        members[&patch].iter().map(|&sheet| layers[sheet].len()).min().unwrap_or(0)
+    };
     // Plane patches that have no other side so far.
     let mut alone = BTreeMap::<Vec<(u32, bool)>, u32>::new();
     let extent = |patches: [u32; 2]| {
         let own = patches.into_iter().flat_map(|patch| &members[&patch]);
-        thickness(points, own.map(|&face| faces[face]), members[&patches[0]].len())
+        thickness(points, own.map(|&sheet| sheets[sheet]), members[&patches[0]].len())
     };
     for (&patch, border) in &mut borders {
         if extent([patch; 2]) > most {
             continue;
         }
         border.sort_unstable();
+        let mut drop = |patch: u32, depth: usize, layers: &mut Vec<Vec<usize>>| {
+            for &sheet in &members[&patch] {
+                let own = &mut layers[sheet];
+                own.split_off(own.len() - depth).into_iter().for_each(|face| is_wall[face] = true);
+            }
+        };
         let across: Vec<(u32, bool)> = border.iter().map(|&(edge, up)| (edge, !up)).collect();
-        let Some(&other) = alone.get(&across) else {
-            alone.insert(border.clone(), patch);
+        let other = match (alone.get(&across), alone.get(border)) {
+            (Some(&other), _) => Some((other, usize::MAX, &across)),
+            // The arrangement parts bodies whose walls are exactly plane.
+            (None, Some(&other)) if extent([patch, other]) > 0.0 => {
+                Some((other, opposed(patch), &*border))
+            }
+            _ => None,
+        };
+        let Some((other, most_layers, key)) = other else {
+            alone.entry(border.clone()).or_insert(patch);
             continue;
         };
+        let own = depth_of(patch, &layers);
+        let depth = own.min(depth_of(other, &layers)).min(most_layers);
         let apart = extent([patch, other]);
-        let by_edge = border.chunk_by(|a, b| a.0 == b.0);
-        let opens = |run: &[(u32, bool)]| left[run[0].0 as usize] == 2 * run.len() + 1;
-        if apart <= most && !by_edge.into_iter().any(opens) {
-            border.iter().for_each(|&(edge, _)| left[edge as usize] -= 2);
-            [patch, other]
-                .iter()
-                .flat_map(|patch| &members[patch])
-                .for_each(|&f| is_wall[f] = true);
-            distance = distance.max(apart);
-            alone.remove(&across);
+        let mut by_edge = border.chunk_by(|a, b| a.0 == b.0);
+        let opens = |run: &[(u32, bool)]| left[run[0].0 as usize] == 2 * depth * run.len() + 1;
+        if apart > most || depth == 0 || by_edge.any(opens) {
+            continue;
+        }
+        border.iter().for_each(|&(edge, _)| left[edge as usize] -= 2 * depth);
+        [patch, other].iter().for_each(|&patch| drop(patch, depth, &mut layers));
+        distance = distance.max(apart);
+        // What has further copies may bound another wall.
+        if depth_of(other, &layers) == 0 {
+            alone.remove(key);
+        }
+        if depth_of(patch, &layers) > 0 {
+            alone.insert(border.clone(), patch);
         }
     }
     (is_wall, distance)
+}
+
+/// The triangles of different corners, each with its faces: those of the orientation of most, less those of the other one,
+/// which are walls like their partners.
+fn sheets(faces: &[[u32; 3]], is_wall: &mut [bool]) -> Vec<([u32; 3], Vec<usize>)> {
+    let corners = |face: u32| {
+        let mut corners = faces[face as usize];
+        corners.sort_unstable();
+        corners
+    };
+    // Two sides of a triangle that touches no other are a body without volume.
+    let mut is_alone = vec![true; faces.len()];
+    for group in sides_by_edge(faces).chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)) {
+        if group.iter().any(|&(.., h)| corners(h / 3) != corners(group[0].2 / 3)) {
+            group.iter().for_each(|&(.., h)| is_alone[h as usize / 3] = false);
+        }
+    }
+    let mut by_corners: Vec<([u32; 3], bool, usize)> = (0..)
+        .zip(faces)
+        .map(|(index, &[a, b, c])| {
+            let is_odd = (a > b) != ((b > c) != (a > c));
+            (corners(index as u32), is_odd, index)
+        })
+        .collect();
+    by_corners.sort_unstable();
+    let sheets = by_corners.chunk_by(|s, t| s.0 == t.0).filter_map(|copies| {
+        let odd = copies.iter().filter(|copy| copy.1).count();
+        let pairs = odd.min(copies.len() - odd);
+        // Even ones come first.
+        let (ends, kept) = (copies.len() - pairs, pairs..copies.len() - pairs);
+        let walls = copies[..pairs].iter().chain(&copies[ends..]);
+        walls.for_each(|&(.., face)| is_wall[face] = !is_alone[face]);
+        let kept: Vec<usize> = copies[kept].iter().map(|&(.., face)| face).collect();
+        kept.first().map(|&first| (faces[first], kept.clone()))
+    });
+    sheets.collect()
 }
 
 /// Extent of faces across the plane of the `first` ones; infinite if these have no area.

@@ -299,7 +299,7 @@ pub enum Repair {
         /// The longest way that one was moved, in the unit of the file.
         largest_move: f64,
     },
-    /// Vertices within a distance were merged, which closed the surface.
+    /// Vertices within a distance were merged, which closed the surface or parted vertices too near to each other.
     WeldedWithin { vertices: usize, distance: f64 },
     /// Plane walls between touching bodies were left out; their two sides were apart by at most a distance in the unit of the file.
     DroppedWalls { faces: usize, distance: f64 },
@@ -409,10 +409,7 @@ impl fmt::Display for Repair {
                 write!(f, "separated parts at {what}, by {largest_move:.3e} at most")
             }
             Self::WeldedWithin { distance, .. } => {
-                write!(
-                    f,
-                    "merged {what} within {distance:.1e} of another, which closes the surface"
-                )
+                write!(f, "merged {what} within {distance:.1e} of another")
             }
             Self::DroppedWalls { distance, .. } => {
                 write!(

@@ -21,16 +21,17 @@ use super::check::orient_and_examine;
 use super::intersections::intersections;
 use super::mend::separate;
 use super::mesh::{TriMesh, Unit};
-use super::parts::{Parted, parted, split_at_vertices, walls};
+use super::parts::{ASIDE, PLACE, Parted, parted, split_at_vertices, walls};
 use super::repair::{Duplicates, Repaired, build, compact, repair, weld_within};
 use super::report::{Repair, SurfaceReport};
 use super::soup::PolygonSoup;
 use super::topology::{Topology, repairs, shells, turn_over};
-use super::{Contraction, Folds, Inspection, Loaded, contract_short_edges};
+use super::{Contraction, Folds, InsideTest, Inspection, Loaded, contract_short_edges};
 use crate::Vec3;
 
-/// Largest distances of welded vertices, as fractions of the diagonal of the bounding box.
-const TOLERANCES: [f64; 5] = [0.0, 1e-12, 1e-9, 1e-7, 1e-6];
+/// Largest distances of welded vertices, as fractions of the diagonal of the bounding box. Vertices nearer than the first
+/// spoil the arrangement, so that it comes before an exact weld.
+const TOLERANCES: [f64; 5] = [1e-12, 0.0, 1e-9, 1e-7, 1e-6];
 
 /// Largest thickness of a wall between bodies, as a fraction of the diagonal.
 const WALL: f64 = 1e-6;
@@ -43,6 +44,12 @@ const SLIGHT: f64 = 1e-4;
 
 /// Change of the extent, and of the volume by a further pass, as shares, above which an arrangement is taken for wrong.
 const LOSS: f64 = 1e-6;
+
+/// Faces beside which the winding number of an arrangement is compared with that of the surface.
+const COMPARED: usize = 2_000;
+
+/// Compared points for each one that may differ, in a sliver.
+const SELDOM: usize = 500;
 
 /// Limit of passes through the arrangement.
 const PASSES: usize = 4;
@@ -59,8 +66,12 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
     }
     let mut repairs = checked.report.repairs.clone();
     let (mut built, weld) = closed(soup, unit, diagonal)?;
-    let walls = drop_walls(&mut built);
+    let walls = drop_walls(&mut built.vertices, &mut built.faces);
+    built.points = unit.forward_all(&built.vertices);
     let (mut mesh, turns) = oriented(built)?;
+    // Bodies that were inside out have walls of opposite orientation now.
+    let further = drop_walls(&mut mesh.vertices, &mut mesh.faces);
+    let walls = joined(walls, further);
     // The check dropped walls, and turned faces that it joined in another way.
     repairs.retain(|repair| {
         use Repair::{DroppedDuplicateFaces, ReorientedFaces, TurnedInward, TurnedOutward};
@@ -95,7 +106,11 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
     for pass in 0..PASSES {
         let mut edges = 0;
         let before = volume(&mesh, unit);
-        mesh = arranged(&mesh)?;
+        let found = arranged(&mesh)?;
+        if pass == 0 && !is_region(&found, &mesh, unit) {
+            return None;
+        }
+        mesh = found;
         // The first pass alone removes overlaps.
         if pass > 0 && (volume(&mesh, unit) - before).abs() > LOSS * before.abs() {
             return None;
@@ -128,6 +143,30 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
         mesh = found.mesh;
     }
     None
+}
+
+/// Whether a surface bounds the region in which another one has a winding number of at least 1, at points beside the faces
+/// of that one. Points that are as near to a surface as its rounding do not count.
+fn is_region(found: &TriMesh, surface: &TriMesh, unit: Unit) -> bool {
+    let [of_found, of_surface] = [found, surface]
+        .map(|mesh| InsideTest::of_scaled(unit, &unit.forward_all(&mesh.vertices), &mesh.faces));
+    let stride = surface.faces.len().div_ceil(COMPARED);
+    let (mut compared, mut differing) = (0, 0);
+    for face in (0..surface.faces.len()).step_by(stride.max(1)) {
+        let [a, b, c] = surface.triangle(face).map(|p| unit.forward(p));
+        let normal = (b - a).cross(c - a);
+        let Some(across) = normal.try_normalize() else { continue };
+        let at = PLACE[0] * a + PLACE[1] * b + PLACE[2] * c;
+        for side in [-1.0, 1.0] {
+            let p = at + side * ASIDE * normal.length().sqrt() * across;
+            let windings = [&of_found, &of_surface].map(|test| test.winding_of_scaled(p));
+            if let [Some(found), Some(surface)] = windings {
+                compared += 1;
+                differing += usize::from((found >= 1) != (surface >= 1));
+            }
+        }
+    }
+    differing * SELDOM <= compared
 }
 
 /// An examined solid after all repairs.
@@ -185,23 +224,33 @@ fn closed(soup: &PolygonSoup, unit: Unit, diagonal: f64) -> Option<(Repaired, Op
 }
 
 /// Leaves out the walls between bodies.
-fn drop_walls(built: &mut Repaired) -> Option<Repair> {
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for &p in &built.points {
-        (low, high) = (low.min(p), high.max(p));
-    }
-    let (is_wall, distance) = walls(&built.points, &built.faces, WALL * (high - low).length());
-    let faces = is_wall.iter().filter(|&&wall| wall).count();
-    if faces == 0 || faces == built.faces.len() {
+fn drop_walls(vertices: &mut Vec<Vec3>, faces: &mut Vec<[u32; 3]>) -> Option<Repair> {
+    let unit = Unit::of(vertices);
+    let points = unit.forward_all(vertices);
+    let low = points.iter().fold(Vec3::INFINITY, |low, &p| low.min(p));
+    let high = points.iter().fold(Vec3::NEG_INFINITY, |high, &p| high.max(p));
+    let (is_wall, distance) = walls(unit, &points, faces, WALL * (high - low).length());
+    let dropped = is_wall.iter().filter(|&&wall| wall).count();
+    if dropped == 0 || dropped == faces.len() {
         return None;
     }
     let mut of_face = is_wall.iter();
-    built.faces.retain(|_| of_face.next() == Some(&false));
-    let kept = compact(built.vertices.len(), &mut built.faces);
-    (built.vertices, built.points) =
-        kept.into_iter().map(|v| (built.vertices[v as usize], built.points[v as usize])).unzip();
-    let distance = built.unit.backward(distance, 1).unwrap_or_default();
-    Some(Repair::DroppedWalls { faces, distance })
+    faces.retain(|_| of_face.next() == Some(&false));
+    let kept = compact(vertices.len(), faces);
+    *vertices = kept.into_iter().map(|v| vertices[v as usize]).collect();
+    let distance = unit.backward(distance, 1).unwrap_or_default();
+    Some(Repair::DroppedWalls { faces: dropped, distance })
+}
+
+/// Walls that were left out in two steps.
+fn joined(first: Option<Repair>, second: Option<Repair>) -> Option<Repair> {
+    match (first, second) {
+        (
+            Some(Repair::DroppedWalls { faces, distance }),
+            Some(Repair::DroppedWalls { faces: more, distance: other }),
+        ) => Some(Repair::DroppedWalls { faces: faces + more, distance: distance.max(other) }),
+        (first, second) => first.or(second),
+    }
 }
 
 /// Faces oriented like their neighbours, and bodies outward, or inward where they are cavities; with the repairs. None for
@@ -294,4 +343,30 @@ fn arranged(mesh: &TriMesh) -> Option<TriMesh> {
     let reaches = found.bounding_box()?;
     let lost = (reaches.0 - low).abs().max((reaches.1 - high).abs()).max_element();
     (lost <= LOSS * (high - low).max_element()).then_some(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tetrahedron at a place, outward.
+    fn tetrahedron(at: Vec3, first: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+        let vertices = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].map(|v| v + at).to_vec();
+        let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        (vertices, faces.map(|face| face.map(|v| v + first)).to_vec())
+    }
+
+    #[test]
+    fn a_lost_body_is_noticed() {
+        let (mut vertices, mut faces) = tetrahedron(Vec3::ZERO, 0);
+        let one = TriMesh { vertices: vertices.clone(), faces: faces.clone() };
+        let other = tetrahedron(Vec3::splat(0.05), 4);
+        vertices.extend(other.0);
+        faces.extend(other.1);
+        let both = TriMesh { vertices, faces };
+        let unit = Unit::of(&both.vertices);
+        let union = arranged(&both).expect("an arrangement");
+        assert!(is_region(&union, &both, unit) && is_region(&one, &one, unit));
+        assert!(!is_region(&one, &both, unit));
+    }
 }

@@ -25,8 +25,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonSoup, Fault> {
         }
         let rest =
             announced.checked_mul(STL_TRIANGLE).and_then(|all| triangles.len().checked_sub(all));
-        // A remainder of whole triangles means that the count is wrong.
-        let Some(rest) = rest.filter(|rest| announced > 0 && rest % STL_TRIANGLE != 0) else {
+        // A remainder with whole triangles means that the count is wrong.
+        let Some(rest) = rest.filter(|&rest| announced > 0 && rest < STL_TRIANGLE) else {
             let holds = format!(
                 "{} bytes after its header, {STL_TRIANGLE} for each triangle",
                 triangles.len()

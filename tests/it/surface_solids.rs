@@ -249,15 +249,19 @@ fn walls_cut_in_two_ways_and_rounded_are_no_gaps() {
         let other = inverted(moved(cuboid(low, high), |v| low + high - v));
         let axis = Vec3::from([(); 3].map(|()| random.random_range(-1.0..1.0))).normalize();
         let turn = DMat3::from_axis_angle(axis, random.random_range(0.0..TAU));
-        let both = moved(joined(&[cube(), other]), |v| {
-            Vec3::from((turn * v).to_array().map(|x| f64::from(x as f32)))
-        });
-        let report = read(&both).report;
-        assert_eq!(report.expected_betti, Some([1, 0, 0]), "case {case}: {:?}", report.repairs);
-        let volume = report.volume.expect("closed");
-        assert!((volume - 2.0).abs() < 1e-5, "case {case}: {volume}");
-        let is_wall = |repair: &Repair| matches!(repair, Repair::DroppedWalls { faces: 4, distance } if *distance < 1e-6);
-        assert!(report.repairs.iter().any(is_wall), "case {case}: {:?}", report.repairs);
+        let round = |v: Vec3| Vec3::from((turn * v).to_array().map(|x| f64::from(x as f32)));
+        let parts = [cube(), other.clone(), cube()];
+        let inside_out = [cube(), inverted(other.clone())];
+        let partly = [cube(), inverted(moved(cube(), |v| v + Vec3::X))];
+        // Bodies, one of them twice, one inside out, and one inside out with the same diagonals.
+        for parts in [&parts[..2], &parts, &inside_out, &partly] {
+            let report = read(&moved(joined(parts), round)).report;
+            assert_eq!(report.expected_betti, Some([1, 0, 0]), "case {case}: {:?}", report.repairs);
+            let volume = report.volume.expect("closed");
+            assert!((volume - 2.0).abs() < 1e-5, "case {case}: {volume}");
+            let is_wall = |repair: &Repair| matches!(repair, Repair::DroppedWalls { faces: 4, distance } if *distance < 1e-6);
+            assert!(report.repairs.iter().any(is_wall), "case {case}: {:?}", report.repairs);
+        }
     }
 }
 
