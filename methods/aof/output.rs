@@ -259,7 +259,7 @@ pub(super) fn megabytes(axis: &LatticeVoxels, other_bytes: f64) -> f64 {
     RESIDENT * (output + other_bytes) / 1e6
 }
 
-/// Edges, triangles and tetrahedra of mutually adjacent voxels of which a voxel is the first.
+/// Edges, triangles and tetrahedra of mutually adjacent voxels that begin with a voxel.
 fn simplices(neighbourhood: u32) -> [u32; 3] {
     let after = neighbourhood & AFTER_CENTRE;
     let mut numbers = [after.count_ones(), 0, 0];

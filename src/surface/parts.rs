@@ -40,7 +40,7 @@ pub(super) const ASIDE: f64 = 1e-3;
 /// The same distance at least, in thicknesses of a wall.
 const ABOVE: f64 = 4.0;
 
-/// Limit of the faces at one edge, all of which touch each other.
+/// Largest number of faces at one edge. Each touches all others, so that the pairs grow with the square.
 const MOST_FACES: usize = 1_000;
 
 /// Faces that hang together over edges of two faces.
@@ -77,7 +77,7 @@ impl Patches {
     }
 }
 
-/// The faces of plane walls between bodies, no two of which are farther apart than `most`, and their largest distance.
+/// The faces of plane walls between bodies, and the largest thickness of a wall, which is at most `most`.
 ///
 /// A wall is a pair of faces with the same corners and opposite orientation, or of plane patches of opposite orientation
 /// with the same border, where other faces close the surface without them; or of the same orientation, where the winding
@@ -123,7 +123,7 @@ pub(super) fn walls(
         }
     }
     let test = LazyCell::new(|| InsideTest::of_scaled(unit, points, &faces));
-    // How many windings of opposite sign there are on both sides of a patch: bodies, one of which is inside out.
+    // Number of windings of opposite sign on the two sides of a patch: one of the bodies there is inside out.
     let opposed = |patch: u32| -> usize {
         let corners = |&sheet: &usize| sheets[sheet].map(|v| points[v as usize]);
         let normal = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a);

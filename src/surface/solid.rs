@@ -6,10 +6,10 @@
 //! sides, or on none, and disappear. New vertices are rounded to double precision, so the result is checked like any
 //! file.
 //!
-//! 1. *Weld*: vertices at one place; if the surface is open then, the smallest of [`TOLERANCES`] that closes it.
+//! 1. *Weld*: vertices within the first of [`TOLERANCES`] that closes the surface, or the next one where 2 to 4 fail.
 //! 2. *Orient*: plane walls between bodies are left out, and bodies that touch taken apart (`parts.rs`). Then they are turned
 //!    outward, or inward where they are in an odd number of others. One that touches another from inside is turned with it.
-//! 3. *Resolve*: the winding number. Repeated while rounding makes faces cross.
+//! 3. *Resolve*: the winding number, compared with that of the input at points. Repeated while rounding makes faces cross.
 //! 4. *Separate*: parts that touch in a vertex or along an edge.
 
 use std::collections::HashSet;
@@ -29,8 +29,8 @@ use super::topology::{Topology, repairs, shells, turn_over};
 use super::{Contraction, Folds, InsideTest, Inspection, Loaded, contract_short_edges};
 use crate::Vec3;
 
-/// Largest distances of welded vertices, as fractions of the diagonal of the bounding box. Vertices nearer than the first
-/// spoil the arrangement, so that it comes before an exact weld.
+/// Largest distances of welded vertices, as fractions of the diagonal of the bounding box. The first one comes before an
+/// exact weld, because the arrangement loses volume at nearer vertices.
 const TOLERANCES: [f64; 5] = [1e-12, 0.0, 1e-9, 1e-7, 1e-6];
 
 /// Largest thickness of a wall between bodies, as a fraction of the diagonal.
@@ -45,7 +45,7 @@ const SLIGHT: f64 = 1e-4;
 /// Change of the extent, and of the volume by a further pass, as shares, above which an arrangement is taken for wrong.
 const LOSS: f64 = 1e-6;
 
-/// Faces beside which the winding number of an arrangement is compared with that of the surface.
+/// Number of faces at which the winding number of an arrangement is compared with that of the surface.
 const COMPARED: usize = 2_000;
 
 /// Compared points for each one that may differ, in a sliver.
@@ -64,8 +64,28 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
     if intersecting_pairs > MOST_PAIRS {
         return None;
     }
+    let mut tried = Vec::new();
+    TOLERANCES.into_iter().find_map(|tolerance| {
+        let (built, weld) = welded(soup, unit, tolerance * diagonal)?;
+        // As many vertices are the same ones: a weld merges what a shorter one does.
+        let vertices = built.vertices.len();
+        if built.topology.boundary_edges > 0 || tried.contains(&vertices) {
+            return None;
+        }
+        tried.push(vertices);
+        resolved(built, weld, unit, checked)
+    })
+}
+
+/// The solid of welded triangles.
+fn resolved(
+    mut built: Repaired,
+    weld: Option<Repair>,
+    unit: Unit,
+    checked: &Inspection,
+) -> Option<Loaded> {
+    let diagonal = checked.report.diagonal;
     let mut repairs = checked.report.repairs.clone();
-    let (mut built, weld) = closed(soup, unit, diagonal)?;
     let walls = drop_walls(&mut built.vertices, &mut built.faces);
     built.points = unit.forward_all(&built.vertices);
     let (mut mesh, turns) = oriented(built)?;
@@ -87,12 +107,12 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
     repairs.extend(weld.into_iter().chain(walls).chain(turns));
     let replaced = mesh.faces.len();
     // A weld may have been all that was missing.
-    let welded = examined(&mesh)?;
-    if is_solid(&welded) {
-        return Some(loaded(welded, repairs));
+    let found = examined(&mesh)?;
+    if is_solid(&found) {
+        return Some(loaded(found, repairs));
     }
     let is_wall = |repair: &Repair| matches!(repair, Repair::DroppedDuplicateFaces { .. });
-    if !welded.report.self_intersecting && !welded.report.repairs.iter().any(is_wall) {
+    if !found.report.self_intersecting && !found.report.repairs.iter().any(is_wall) {
         // Parts touch in common vertices and edges alone: nothing has to be arranged.
         let TriMesh { mut vertices, mut faces } = mesh.clone();
         let separated = separate(&mut vertices, &mut faces);
@@ -145,11 +165,13 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
     None
 }
 
-/// Whether a surface bounds the region in which another one has a winding number of at least 1, at points beside the faces
-/// of that one. Points that are as near to a surface as its rounding do not count.
+/// Whether `found` bounds the region where the winding number of `surface` is at least 1, by points beside the faces of
+/// `surface`, at least [`WALL`] away from them. One of [`SELDOM`] points may differ.
 fn is_region(found: &TriMesh, surface: &TriMesh, unit: Unit) -> bool {
     let [of_found, of_surface] = [found, surface]
         .map(|mesh| InsideTest::of_scaled(unit, &unit.forward_all(&mesh.vertices), &mesh.faces));
+    let (low, high) = surface.bounding_box().unwrap_or_default();
+    let least = WALL * (unit.forward(high) - unit.forward(low)).length();
     let stride = surface.faces.len().div_ceil(COMPARED);
     let (mut compared, mut differing) = (0, 0);
     for face in (0..surface.faces.len()).step_by(stride.max(1)) {
@@ -158,7 +180,7 @@ fn is_region(found: &TriMesh, surface: &TriMesh, unit: Unit) -> bool {
         let Some(across) = normal.try_normalize() else { continue };
         let at = PLACE[0] * a + PLACE[1] * b + PLACE[2] * c;
         for side in [-1.0, 1.0] {
-            let p = at + side * ASIDE * normal.length().sqrt() * across;
+            let p = at + side * (ASIDE * normal.length().sqrt()).max(least) * across;
             let windings = [&of_found, &of_surface].map(|test| test.winding_of_scaled(p));
             if let [Some(found), Some(surface)] = windings {
                 compared += 1;
@@ -210,17 +232,14 @@ fn is_solid(found: &Inspection) -> bool {
     found.refused.is_none() && !self_intersecting && !repairs.iter().any(is_turned)
 }
 
-/// The triangles with doubled ones, welded within the smallest of [`TOLERANCES`] that closes the surface.
-fn closed(soup: &PolygonSoup, unit: Unit, diagonal: f64) -> Option<(Repaired, Option<Repair>)> {
+/// The triangles with doubled ones, after a weld within a distance.
+fn welded(soup: &PolygonSoup, unit: Unit, distance: f64) -> Option<(Repaired, Option<Repair>)> {
     let exact = weld_within(&soup.vertices, 0.0);
-    TOLERANCES.into_iter().find_map(|tolerance| {
-        let distance = tolerance * diagonal;
-        let welds = weld_within(&soup.vertices, distance);
-        let built = build(soup, unit, &welds, Duplicates::Kept).ok()?;
-        let vertices = welds.iter().zip(&exact).filter(|(a, b)| a != b).count();
-        let repair = (vertices > 0).then_some(Repair::WeldedWithin { vertices, distance });
-        (built.topology.boundary_edges == 0).then_some((built, repair))
-    })
+    let welds = weld_within(&soup.vertices, distance);
+    let built = build(soup, unit, &welds, Duplicates::Kept).ok()?;
+    let vertices = welds.iter().zip(&exact).filter(|(a, b)| a != b).count();
+    let repair = (vertices > 0).then_some(Repair::WeldedWithin { vertices, distance });
+    Some((built, repair))
 }
 
 /// Leaves out the walls between bodies.
