@@ -41,16 +41,15 @@ pub fn mesh(name: &str) -> Option<PathBuf> {
     None
 }
 
-/// All shared surfaces, by name; those of [`free_meshes`] where they are missing.
+/// The surfaces of [`free_meshes`], and all shared ones where they are there.
 ///
 /// # Panics
-/// If they are missing and required.
+/// If those are missing and required.
 pub fn surfaces() -> Vec<PathBuf> {
-    let folder = match folder().join("MANIFEST.csv").exists() || is_required() {
-        true => meshes().unwrap_or_default(),
-        false => free_meshes(),
-    };
-    let entries = std::fs::read_dir(folder).expect("a folder").flatten();
+    let is_there = folder().join("MANIFEST.csv").exists() || is_required();
+    let shared = is_there.then(|| meshes().unwrap_or_default());
+    let folders = shared.into_iter().chain([free_meshes()]);
+    let entries = folders.flat_map(|folder| std::fs::read_dir(folder).expect("a folder").flatten());
     let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
     files.retain(|file| file.extension().is_some_and(|e| e == "off" || e == "obj"));
     files.sort_unstable();
