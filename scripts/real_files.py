@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """The table of docs/measured/real-files.md: what `medial axis` makes of the surface files of a folder, by class of defect.
 
-A file is served if its start has the Betti numbers of the solid and a Hausdorff error of at most 2 % of the diagonal.
+A file is served if its start has the Betti numbers of the solid and a Hausdorff error of at most 2 % of the diagonal. The
+others are wrapped, and served then if the start of the wrap is.
 
     scripts/real_files.py target/release/medial FOLDER [--every N] > table.md
 """
@@ -18,6 +19,7 @@ import tempfile
 SECONDS = 60
 SAMPLES = "3000"
 VERDICTS = ["served", "coarse", "other topology", "refused", "over time"]
+WRAPPED = "served when wrapped"
 
 
 def call(words):
@@ -55,6 +57,14 @@ def verdict(medial, path, axis):
     return "served" if measured["hausdorff"] <= 0.02 else "coarse", seconds
 
 
+def served_wrapped(medial, path, folder):
+    wrapped = f"{folder}/wrapped.off"
+    code, _, seconds = call([medial, "repair", path, "--wrap", "-o", wrapped, "--force", "--threads", "1"])
+    if code != 0 or seconds > SECONDS:
+        return False
+    return verdict(medial, wrapped, f"{folder}/wrapped.ma")[0] == "served"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("medial")
@@ -68,14 +78,17 @@ def main():
         for path in files[:: given.every]:
             info = call([given.medial, "info", str(path), "--json"])[1]
             found, seconds = verdict(given.medial, str(path), f"{folder}/start.ma")
+            wrapped = found != "served" and served_wrapped(given.medial, str(path), folder)
             for row in (defect(info), "all"):
                 counts[row][found] += 1
+                counts[row][WRAPPED] += wrapped
                 times[row].append(seconds)
-            print(f"{path}: {defect(info)}: {found}, {seconds:.2f} s", file=sys.stderr, flush=True)
-    print("| defect | files | " + " | ".join(VERDICTS) + " | median CPU s | largest |")
-    print("|---" * (len(VERDICTS) + 4) + "|")
-    for row in sorted(counts, key=lambda row: (row == "all", -counts[row].total())):
-        cells = [counts[row].total(), *(counts[row][name] for name in VERDICTS)]
+            note = f"{found}, {WRAPPED}" if wrapped else found
+            print(f"{path}: {defect(info)}: {note}, {seconds:.2f} s", file=sys.stderr, flush=True)
+    print("| defect | files | " + " | ".join([*VERDICTS, WRAPPED]) + " | median CPU s | largest |")
+    print("|---" * (len(VERDICTS) + 5) + "|")
+    for row in sorted(counts, key=lambda row: (row == "all", -len(times[row]))):
+        cells = [len(times[row]), *(counts[row][name] for name in [*VERDICTS, WRAPPED])]
         cells += [f"{statistics.median(times[row]):.2f}", f"{max(times[row]):.1f}"]
         print(f"| {row} | " + " | ".join(map(str, cells)) + " |")
 

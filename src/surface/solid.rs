@@ -122,9 +122,8 @@ fn resolved(
             return Some(loaded(found, repairs));
         }
     }
-    let mut separations = Vec::new();
     for pass in 0..PASSES {
-        let mut edges = 0;
+        let (mut edges, mut separations) = (0, None);
         let before = volume(&mesh, unit);
         let found = arranged(&mesh)?;
         if pass == 0 && !is_region(&found, &mesh, unit) {
@@ -137,8 +136,8 @@ fn resolved(
         }
         let mut found = examined(&mesh)?;
         if !is_solid(&found) {
-            let (mut vertices, mut faces) = touching(mesh);
-            separations.extend(separate(&mut vertices, &mut faces));
+            let (mut vertices, mut faces) = touching(mesh.clone());
+            separations = separate(&mut vertices, &mut faces);
             found = examined(&TriMesh { vertices, faces })?;
         }
         if found.refused.is_none() {
@@ -160,7 +159,7 @@ fn resolved(
             repairs.extend((edges > 0).then_some(Repair::ContractedEdges { edges, distance }));
             return Some(loaded(found, repairs));
         }
-        mesh = found.mesh;
+        // The arrangement itself goes on: the check leaves out one of two opposite faces, which opens it.
     }
     None
 }

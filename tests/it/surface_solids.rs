@@ -98,12 +98,16 @@ fn overlapping_parts_stay_outward_and_touching_cavities_inward() {
 
 /// Boxes of whole sides in some unit: the number of cells in their union, and their faces. Some boxes are inside out, but
 /// none that another one encloses, which could be a cavity.
-fn boxes(random: &mut Pcg64, unit: f64) -> (usize, TriMesh) {
+fn boxes(random: &mut Pcg64, unit: f64, side: i32, height: Option<i32>) -> (usize, TriMesh) {
     let count = random.random_range(2..6);
     let spans: Vec<[[i32; 3]; 2]> = (0..count)
         .map(|_| {
-            let low = [(); 3].map(|()| random.random_range(0..4));
-            [low, low.map(|x| x + random.random_range(1..4))]
+            let mut low = [(); 3].map(|()| random.random_range(0..side));
+            let mut high = low.map(|x| x + random.random_range(1..side));
+            if let Some(height) = height {
+                (low[2], high[2]) = (0, height);
+            }
+            [low, high]
         })
         .collect();
     let mut cells = HashSet::new();
@@ -138,7 +142,7 @@ fn boxes_that_touch_and_overlap_have_the_volume_of_their_union() {
     let (mut refused, mut cases) = (0, 0);
     for case in 0..160 {
         let unit = [1.0, 1.0, 3e-110, 7e40][case % 4];
-        let (cells, mut mesh) = boxes(&mut random, unit);
+        let (cells, mut mesh) = boxes(&mut random, unit, 4, None);
         let volume = |mesh: &TriMesh| {
             let inspected = surface::inspect_bytes("boxes.off", to_off(mesh).as_bytes());
             let inspected = inspected.expect("a surface");
@@ -167,6 +171,17 @@ fn boxes_that_touch_and_overlap_have_the_volume_of_their_union() {
         }
     }
     assert!(refused <= cases / 50, "{refused} of {cases} refused");
+}
+
+#[test]
+fn boxes_of_one_height_have_the_volume_of_their_union() {
+    let mut random = Pcg64::seed_from_u64(13);
+    for case in 0..100 {
+        // Many faces overlap in two planes.
+        let (cells, mesh) = boxes(&mut random, 1.0, 10, Some(3));
+        let volume = read(&mesh).report.volume.expect("resolved");
+        assert!((volume - cells as f64).abs() < 5e-3 * cells as f64, "case {case}: {volume}");
+    }
 }
 
 /// Bodies of whole cells, with common vertices where they touch or overlap: the number of cells in their union, and their
