@@ -28,7 +28,7 @@ pub struct Arguments {
     /// 1 / ALPHA^2.
     #[arg(long, value_name = "ALPHA", conflicts_with = "fill_holes")]
     wrap: Option<Option<f64>>,
-    /// Keep all parts, the largest, the N largest, or those with a SHARE of the area (0.01 drops dust).
+    /// Keep all parts, the largest, the N largest, or those with a SHARE of the area (0.01 drops dust). A part has its cavities.
     #[arg(long, default_value = "all", value_name = "all|largest|N|SHARE")]
     components: Components,
 }

@@ -8,11 +8,11 @@ use super::mesh::Unit;
 use super::parts::parted;
 use super::report::{Fault, Repair, VertexName};
 use super::soup::PolygonSoup;
-use super::topology::Topology;
+use super::topology::{Topology, solids};
 use super::{Inspection, Loaded, SurfaceError, TriMesh, inspected};
 use crate::Vec3;
 
-/// Which parts of a surface are kept.
+/// Which parts of a surface are kept, each with its cavities.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Components {
     /// All of them.
@@ -90,7 +90,7 @@ fn mended(inspection: Inspection, options: MendOptions) -> Result<Loaded, Surfac
     let mut repairs = report.repairs;
     // The examination of the result repeats its warnings; a failed one has none of the reader.
     let mut warnings = if refused.is_some() { Vec::new() } else { report.warnings };
-    repairs.extend(keep(&mut mesh, options.components));
+    repairs.extend(keep(&mut mesh, options.components)?);
     let TriMesh { mut vertices, mut faces } = mesh;
     if options.fill_holes {
         // The loops of holes pass a vertex once only if its fans are separate.
@@ -109,19 +109,26 @@ fn mended(inspection: Inspection, options: MendOptions) -> Result<Loaded, Surfac
     Ok(loaded)
 }
 
-/// Keeps the faces of some components.
-fn keep(mesh: &mut TriMesh, which: Components) -> Option<Repair> {
+/// Keeps the faces of some solids, each with its cavities.
+///
+/// # Errors
+/// When too many components lie in others.
+fn keep(mesh: &mut TriMesh, which: Components) -> Result<Option<Repair>, Fault> {
     if which == Components::All {
-        return None;
+        return Ok(None);
     }
-    let component = Topology::new(mesh.vertices.len(), &mesh.faces).component;
-    let components = component.iter().max().map_or(0, |&last| last as usize + 1);
+    let topology = Topology::new(mesh.vertices.len(), &mesh.faces);
+    let unit = Unit::of(&mesh.vertices);
+    let points = unit.forward_all(&mesh.vertices);
+    let components = topology.first_face.len();
+    let solid_of = solids(unit, &points, &mesh.faces, &topology)
+        .map_err(|_| Fault::TooManyNested { components })?;
     let mut areas = vec![0.0; components];
-    for (face, &component) in component.iter().enumerate() {
-        let [a, b, c] = mesh.triangle(face);
-        areas[component as usize] += (b - a).cross(c - a).length();
+    for (face, &component) in topology.component.iter().enumerate() {
+        let [a, b, c] = mesh.faces[face].map(|v| points[v as usize]);
+        areas[solid_of[component as usize]] += (b - a).cross(c - a).length();
     }
-    let mut by_area: Vec<usize> = (0..components).collect();
+    let mut by_area: Vec<usize> = (0..components).filter(|&c| solid_of[c] == c).collect();
     by_area.sort_by(|&a, &b| areas[b].total_cmp(&areas[a]).then(a.cmp(&b)));
     let all: f64 = areas.iter().sum();
     let number = match which {
@@ -133,11 +140,11 @@ fn keep(mesh: &mut TriMesh, which: Components) -> Option<Repair> {
     by_area.iter().take(number.max(1)).for_each(|&c| is_kept[c] = true);
     let faces = mesh.faces.len();
     // `retain` visits faces in order, so the iterator keeps pace with it.
-    let mut of_face = component.iter();
-    mesh.faces.retain(|_| of_face.next().is_some_and(|&c| is_kept[c as usize]));
-    let components = is_kept.iter().filter(|&&kept| !kept).count();
+    let mut of_face = topology.component.iter().map(|&c| is_kept[solid_of[c as usize]]);
+    mesh.faces.retain(|_| of_face.next() == Some(true));
+    let components = (0..components).filter(|&c| !is_kept[solid_of[c]]).count();
     let dropped = Repair::DroppedComponents { components, faces: faces - mesh.faces.len() };
-    (components > 0).then_some(dropped)
+    Ok((components > 0).then_some(dropped))
 }
 
 // Closes holes of a surface by triangles between their vertices; no vertex is moved or added.

@@ -7,7 +7,7 @@
 use std::ops::ControlFlow;
 
 use super::inside::{Crossing, InsideTest};
-use super::intersections::Intersections;
+use super::intersections::{Intersections, intersections};
 use super::mesh::Unit;
 use super::report::Repair;
 use crate::Vec3;
@@ -54,6 +54,15 @@ impl Topology {
         topology.count_fans(vertices, faces);
         topology.number_components(faces.len(), &mut parts);
         topology
+    }
+
+    /// For each component whether some edge of it has not two faces.
+    fn open_components(&self) -> Vec<bool> {
+        let mut is_open = vec![false; self.first_face.len()];
+        for (across, component) in self.across.chunks_exact(3).zip(&self.component) {
+            is_open[*component as usize] |= across.contains(&NONE);
+        }
+        is_open
     }
 
     /// Whether no edge has more than two faces, and every vertex has one fan of them.
@@ -241,10 +250,33 @@ pub(super) fn shells(
         let size = |&other: &u32| shells[other as usize].volume.abs();
         let touches = touched.iter().copied().min_by(|a, b| size(a).total_cmp(&size(b)));
         let shell = &mut shells[k];
-        (shell.depth, shell.touched) = (apart + touched.len(), touched.len());
+        (shell.depth, shell.touched) = (apart.len() + touched.len(), touched.len());
         shell.touches = touches.map(|other| other as usize);
     }
     Ok(shells)
+}
+
+/// For each component the one whose solid it bounds: the innermost closed component around it if it is a cavity, in an odd
+/// number of them, else itself. A component that is open bounds none but its own.
+pub(super) fn solids(
+    unit: Unit,
+    points: &[Vec3],
+    faces: &[[u32; 3]],
+    topology: &Topology,
+) -> Result<Vec<usize>, TooManyNested> {
+    let parts = Parts { unit, points, faces, component: &topology.component };
+    let meeting = intersections(points, faces, &topology.component).components;
+    let is_open = topology.open_components();
+    let mut around: Vec<Vec<u32>> = depths(&parts, &topology.first_face, &meeting)?
+        .into_iter()
+        .map(|Around { apart, touched }| [apart, touched].concat())
+        .collect();
+    around.iter_mut().for_each(|around| around.retain(|&other| !is_open[other as usize]));
+    let solid_of = |own: usize| match around[own].iter().max_by_key(|&&k| around[k as usize].len()) {
+        Some(&owner) if around[own].len() % 2 == 1 && !is_open[own] => owner as usize,
+        _ => own,
+    };
+    Ok((0..around.len()).map(solid_of).collect())
 }
 
 /// Exchanges two corners of the faces that are marked.
@@ -340,8 +372,8 @@ pub(super) struct TooManyNested;
 /// The components around one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Around {
-    /// Number of those that it does not touch.
-    pub apart: usize,
+    /// Those that it does not touch.
+    pub apart: Vec<u32>,
     /// Those that it touches.
     pub touched: Vec<u32>,
 }
@@ -404,7 +436,7 @@ fn count_separate(
             let around = std::mem::take(&mut winding[other as usize]) != 0;
             let meets = meeting.binary_search(&[own.min(other), own.max(other)]).is_ok();
             if around && other != own && !meets {
-                found[own as usize].apart += 1;
+                found[own as usize].apart.push(other);
             }
         }
     }

@@ -581,6 +581,37 @@ fn the_largest_part_is_kept() {
 }
 
 #[test]
+fn a_part_is_kept_with_its_cavities() {
+    // Hollow in a hollow one, next to a cube, of which one lacks a face.
+    let hollow = |r: f64| [shell(r), inverted(shell(0.9 * r))];
+    let cube = moved(shell(1.0), |v| v + 9.0);
+    let parts = [&hollow(4.0)[..], &hollow(2.0), &[cube]].concat();
+    let volume = |r: f64| (1.0 - 0.9_f64.powi(3)) * (2.0 * r).powi(3);
+    let keep = |mesh: &TriMesh, components| {
+        mend(mesh, MendOptions { components, ..MendOptions::default() }).expect("a solid").report
+    };
+    for parts in [parts.clone(), parts.into_iter().rev().collect()] {
+        let mut mesh = joined(&parts);
+        for open in [false, true] {
+            if open {
+                let of_cube = |face: &[u32; 3]| mesh.vertices[face[0] as usize].x > 7.0;
+                let face = mesh.faces.iter().position(of_cube).expect("a face of the cube");
+                mesh.faces.remove(face);
+            }
+            for (which, volume, betti) in [
+                (Components::Largest(1), volume(4.0), [1, 0, 1]),
+                (Components::Largest(2), volume(4.0) + volume(2.0), [2, 0, 2]),
+                (Components::Share(0.1), volume(4.0) + volume(2.0), [2, 0, 2]),
+            ] {
+                let report = keep(&mesh, which);
+                assert!((report.volume.expect("closed") - volume).abs() < 1e-9);
+                assert_eq!(report.expected_betti, Some(betti), "{which:?}, open: {open}");
+            }
+        }
+    }
+}
+
+#[test]
 fn surfaces_that_are_flat_after_the_repair_are_rejected() {
     let triangle = TriMesh { vertices: vec![Vec3::ZERO, Vec3::X, Vec3::Y], faces: vec![[0, 1, 2]] };
     let fault = mend(&triangle, FILL).expect_err("flat").fault;
