@@ -238,9 +238,37 @@ impl<'a> Comparison<'a> {
         if unmeasured > 0 {
             cautions.push(format!("{unmeasured} results were never evaluated."));
         }
+        cautions.extend(remarks_of_meshes(records()));
         cautions
     }
 }
+
+/// What all results of a mesh are warned of, as of repairs of its surface, with the mesh; at most [`MOST_REMARKS`], and how
+/// many more.
+pub fn remarks_of_meshes<'a>(records: impl IntoIterator<Item = &'a Record>) -> Vec<String> {
+    let mut common: Vec<(&str, Vec<&str>)> = Vec::new();
+    for record in records.into_iter().filter(|record| record.status.has_result()) {
+        let own = record.warnings();
+        match common.iter_mut().find(|(mesh, _)| *mesh == record.mesh) {
+            Some((_, known)) => known.retain(|warning| own.contains(warning)),
+            None => common.push((&record.mesh, own)),
+        }
+    }
+    let mut remarks: Vec<String> = common
+        .into_iter()
+        .flat_map(|(mesh, warnings)| warnings.into_iter().map(move |w| format!("{mesh}: {w}")))
+        .map(|remark| printable(&remark))
+        .collect();
+    let more = remarks.len().saturating_sub(MOST_REMARKS);
+    if more > 0 {
+        remarks.truncate(MOST_REMARKS);
+        remarks.push(format!("{more} more remarks on meshes: column `warnings` of results.csv"));
+    }
+    remarks
+}
+
+/// Limit of [`remarks_of_meshes`].
+const MOST_REMARKS: usize = 20;
 
 /// The record of the median Hausdorff error, where one without a result is infinite; of an even number the larger one.
 fn median_seed<'a>(records: &[&'a Record]) -> &'a Record {

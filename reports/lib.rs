@@ -43,6 +43,7 @@ mod tables;
 mod view3d;
 mod write;
 
+pub use comparison::remarks_of_meshes;
 pub use header::{Header, MethodNote, RunNote};
 pub use metric::measured_rows;
 pub use overview::{reasons, summary_text};

@@ -170,6 +170,12 @@ pub struct Record {
 }
 
 impl Record {
+    /// Warnings of the method and of the evaluation, in that order.
+    pub fn warnings(&self) -> Vec<&str> {
+        let evaluation = self.evaluate.iter().flat_map(|evaluation| &evaluation.warnings);
+        self.simplify.warnings.iter().chain(evaluation).map(String::as_str).collect()
+    }
+
     /// Whether no other item of the run disturbed the seconds: only such seconds are comparable.
     pub fn ran_alone(&self) -> bool {
         self.conditions.as_ref().is_none_or(|conditions| conditions.jobs <= 1)

@@ -59,8 +59,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     }
     let [seconds, cpu_seconds] = stages.seconds();
     let expected = shape.expected_betti();
-    let mut warnings = shape.report().warnings.clone();
-    warnings.extend(shape.remarks());
+    let mut warnings = shape.remarks();
     warnings.extend(lost);
     if let Some(expected) = expected.filter(|&expected| expected != betti) {
         let advice = match shape.options().sampling {

@@ -193,7 +193,7 @@ pub fn run(
         records.iter().filter(|record| !shown.contains(&record.key)).cloned().collect();
     reasons(&earlier).iter().for_each(|reason| print_error(reason));
     let shown = edition.map(|edition| edition.beside(&study, &records, registry));
-    finish(&records, shown, [run, found], arguments, &files, global)
+    finish(&records, shown.as_ref(), [run, found], arguments, &files, global)
 }
 
 /// Numbers of spheres on the example shapes, which need few and show all methods within a minute.
@@ -302,7 +302,7 @@ impl Arguments {
 /// Prints the summary and decides the exit code.
 fn finish(
     records: &[Record],
-    mixed: Option<Mixed>,
+    mixed: Option<&Mixed>,
     [run, found]: [usize; 2],
     arguments: &Arguments,
     files: &[PathBuf],
@@ -311,10 +311,11 @@ fn finish(
     let ok = records.iter().filter(|record| record.status.is_ok()).count();
     let out = &arguments.out;
     let page = out.join(PAGE);
-    let (shown, notes) = match &mixed {
-        Some(mixed) => (&mixed.records[..], &mixed.notes[..]),
-        None => (records, &[][..]),
+    let (shown, mut notes) = match mixed {
+        Some(mixed) => (&mixed.records[..], mixed.notes.clone()),
+        None => (records, Vec::new()),
     };
+    notes.extend(medial_reports::remarks_of_meshes(records));
     if global.json {
         let by_status: serde_json::Map<String, serde_json::Value> =
             Status::ALL.iter().map(|&s| (s.key(), count(records, s).into())).collect();
@@ -322,7 +323,7 @@ fn finish(
             "out": out, "records": records.len(), "run": run, "found": found,
             "status": by_status, "results": out.join(RESULTS), "page": page, "files": files,
         });
-        print_json(&object, notes);
+        print_json(&object, &notes);
     } else {
         if ok > 0 {
             let methods = read_header(out).unwrap_or_default().methods;

@@ -74,7 +74,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let rows = arguments.axes.iter().map(|path| evaluate(path, arguments, &evaluator, &line));
     let mut rows: Vec<_> = rows.collect();
     drop(line);
-    let warnings = &[&input.report.warnings[..], &shape.remarks()].concat();
+    let warnings = &shape.remarks();
     // One file keeps the exit codes and the object of a single evaluation.
     if rows.len() == 1 {
         let row = rows.remove(0)?;

@@ -144,16 +144,13 @@ type Read = (Option<Shape>, Option<MedialMesh>, Vec<String>);
 
 fn read(arguments: &Arguments) -> Result<Read, Failure> {
     let options = arguments.substrate.shape_options()?;
-    let mut warnings = Vec::new();
     let loaded = arguments
         .mesh
         .as_ref()
         .map(|mesh| shape_of(mesh, options, arguments.substrate.as_is))
         .transpose()?;
-    let shape = loaded.map(|(input, shape)| {
-        warnings.extend(input.report.warnings);
-        shape
-    });
+    let shape = loaded.map(|(_, shape)| shape);
+    let mut warnings = shape.as_ref().map_or_else(Vec::new, Shape::remarks);
     let axis = match (&arguments.axis, &shape) {
         (None, _) => None,
         (Some(path), Some(shape)) => Some(read_axis(path, shape, arguments.fitting.into())?.0),

@@ -112,8 +112,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     drawing.content(arguments.axes.len()).map_err(failed)?;
     let line = global.stages();
     line.at("reading");
-    let (input, shape) = shape_of(&arguments.mesh, ShapeOptions::default(), false)?;
-    let mut warnings = input.report.warnings;
+    let (_, shape) = shape_of(&arguments.mesh, ShapeOptions::default(), false)?;
+    let mut warnings = shape.remarks();
     let units = shape.normalisation();
     let mut axes: Vec<(String, MedialMesh)> = Vec::new();
     for path in &arguments.axes {

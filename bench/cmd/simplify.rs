@@ -77,9 +77,8 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         )));
     }
     // The others are remarks of the result.
-    let repairs = input.report.repairs.iter().filter(|repair| !repair.changes_geometry());
-    let repairs = repairs.map(|repair| format!("repaired: {repair}"));
-    let mut warnings: Vec<String> = repairs.chain(input.report.warnings.iter().cloned()).collect();
+    let repairs = input.report.repairs.iter().filter(|repair| !repair.changes_solid());
+    let mut warnings: Vec<String> = repairs.map(|repair| format!("repaired: {repair}")).collect();
     if let Some(path) = &arguments.initial {
         let (initial, notes) = read_axis(path, &shape, arguments.fitting.into())?.0.with_remarks();
         warnings.extend(notes);

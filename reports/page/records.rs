@@ -7,7 +7,7 @@ use medial_run::text::significant;
 use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, Entry, level_label, reached};
-use crate::tables::{Best, flatten, remark, topology_word, warnings};
+use crate::tables::{Best, flatten, remark, topology_word};
 
 /// A larger table would exhaust a browser's memory.
 pub(super) const MOST: usize = 20_000;
@@ -55,7 +55,7 @@ fn row(comparison: &Comparison<'_>, entry: &Entry<'_>, best: &Best) -> Vec<(Stri
         row.push((format!("table/{}", metric.key), json!(rounded)));
         bits |= u32::from(best.is_best(entry, metric, value)) << bit;
     }
-    let warnings = warnings(record);
+    let warnings = record.warnings();
     let cells = [
         ("mesh", json!(entry.mesh)),
         ("series", json!(entry.series)),

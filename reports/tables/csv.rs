@@ -131,7 +131,7 @@ fn row(comparison: &Comparison<'_>, entry: &Entry<'_>) -> BTreeMap<String, Strin
         ("params", json!(simplify.params).to_string()),
         ("diagnostics", json!(simplify.diagnostics).to_string()),
         ("seeds", json!(record.seeds).to_string()),
-        ("warnings", warnings(record).join("; ")),
+        ("warnings", record.warnings().join("; ")),
     ]
     .map(|(name, text)| (name.to_owned(), inert(text)))
     .into();
@@ -195,12 +195,6 @@ fn inert(cell: String) -> String {
     let formula = cell.starts_with(['=', '+', '-', '@', '\t', '\r']);
     let cell = printable(&cell);
     if formula && cell.parse::<f64>().is_err() { format!("'{cell}") } else { cell }
-}
-
-/// Warnings of the method and of the evaluation, in that order.
-pub(crate) fn warnings(record: &Record) -> Vec<&str> {
-    let evaluation = record.evaluate.iter().flat_map(|evaluation| &evaluation.warnings);
-    record.simplify.warnings.iter().chain(evaluation).map(String::as_str).collect()
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use medial_run::text::{escape_html, printable};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
-pub(crate) use self::csv::{flatten, to_csv, warnings};
+pub(crate) use self::csv::{flatten, to_csv};
 pub(crate) use self::mesh::{Best, mesh_table, remark, topology_word};
 pub(crate) use self::topics::topic_tables;
 

@@ -490,13 +490,15 @@ impl Shape {
         }
     }
 
-    /// What a user has to know of the surface and the start of a result: changes to the surface,
+    /// What a user has to know of the surface and the start of a result: changes to the solid, warnings of its report,
     /// [`Shape::sampling_warning`], and spheres that reach far beyond the surface. Of substrates that were not built nothing
     /// is said. Cost: a bounded search in the tree of the surface for each sphere of the start.
     pub fn remarks(&self) -> Vec<String> {
-        let changes = self.report().repairs.iter().filter(|repair| repair.changes_geometry());
+        let report = self.report();
+        let changes = report.repairs.iter().filter(|repair| repair.changes_solid());
         let mut remarks: Vec<String> =
             changes.map(|repair| format!("repaired: {repair}")).collect();
+        remarks.extend(report.warnings.iter().cloned());
         remarks.extend(self.sampling_warning());
         let reach = self.reach().filter(|&reach| reach > FAR_START);
         remarks.extend(reach.map(|reach| {

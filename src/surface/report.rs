@@ -334,8 +334,8 @@ impl Repair {
         self.changed().0
     }
 
-    /// Whether the surface is another set of points afterwards, if only slightly.
-    pub fn changes_geometry(&self) -> bool {
+    /// Whether the surface is another set of points afterwards, if only slightly, or bounds another solid.
+    pub fn changes_solid(&self) -> bool {
         matches!(
             self,
             Self::WeldedWithin { .. }
@@ -346,6 +346,7 @@ impl Repair {
                 | Self::FilledHole { .. }
                 | Self::Wrapped { .. }
                 | Self::DroppedComponents { .. }
+                | Self::TurnedInward { .. }
         )
     }
 

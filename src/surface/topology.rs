@@ -272,7 +272,8 @@ pub(super) fn solids(
         .map(|Around { apart, touched }| [apart, touched].concat())
         .collect();
     around.iter_mut().for_each(|around| around.retain(|&other| !is_open[other as usize]));
-    let solid_of = |own: usize| match around[own].iter().max_by_key(|&&k| around[k as usize].len()) {
+    let solid_of = |own: usize| match around[own].iter().max_by_key(|&&k| around[k as usize].len())
+    {
         Some(&owner) if around[own].len() % 2 == 1 && !is_open[own] => owner as usize,
         _ => own,
     };

@@ -290,3 +290,33 @@ fn faults_of_a_study_are_refused_before_any_run() {
         at.refused(&line, 2, "expected a finite number");
     }
 }
+
+#[test]
+fn changes_of_a_solid_are_said_wherever_it_is_used() {
+    let at = Folder::new();
+    // A cube in another becomes a cavity. One on a shelf far away keeps few digits.
+    at.write("boss.off", cubes_off(&[([0.0; 3], 4.0), ([1.0; 3], 2.0)]));
+    at.write("far.off", cubes_off(&[([1e6, 0.0, 0.0], 1.0)]));
+    at.done("axis boss.off -o boss.ma -q");
+    at.done("axis far.off -o far.ma -q");
+    let compare = "compare boss.off far.off --methods qmat,angle --spheres 20 --counts-only --samples 500 --out report";
+    let text = at.done(compare);
+    let page = at.text("report/index.html");
+    for (mesh, words) in [("boss", "turned 1 component inward"), ("far", "digits are lost")] {
+        let line = text.lines().find(|line| line.starts_with(&format!("{mesh}: ")));
+        assert!(line.is_some_and(|line| line.contains(words)), "{text}");
+        assert!(page.contains(words), "page of {mesh}");
+        for line in [
+            format!("axis {mesh}.off -o again.ma"),
+            format!("evaluate {mesh}.off {mesh}.ma --samples 500"),
+            format!("simplify {mesh}.off -m qmat --spheres 20 -o less.ma"),
+            format!("render {mesh}.off {mesh}.ma -o x.png --size 100x100"),
+            format!("reconstruct {mesh}.ma --mesh {mesh}.off -o x.off --tolerance 0.1"),
+        ] {
+            let text = at.done(&line);
+            assert_eq!(text.matches(words).count(), 1, "{line}\n{text}");
+        }
+    }
+    let warnings = &at.json(compare).1["warnings"];
+    assert_eq!(warnings.as_array().map(Vec::len), Some(2), "{warnings}");
+}
