@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::Refinement;
 use super::skin::{Place, Skin, key, sides};
 use crate::Vec3;
+use crate::complex::Sphere;
 use crate::surface::{PointGrid, TriangleBvh};
 
 /// Distance to a segment below which a point moves onto it, as a share of the tolerated depth.
@@ -16,10 +17,14 @@ const ROUNDING: f64 = 1e-12;
 /// Depth of a ball, as a share of the tolerated one, from which it must not close a gap.
 const LEAST: f64 = 0.01;
 
+/// Least cosine of the angle between the way to a centre beyond the surface and the surface's normal.
+const STRAIGHT: f64 = 0.99;
+
 /// Distance that stays free in front of the deepest point of a ball, in depths.
 const FREE: f64 = 1.5;
 
-/// A ball that is too large for its place.
+/// A ball that is too large for its place: that of a cell inside, or of the circle in which one that is centred beyond the
+/// surface meets a plane of it, as in thin plates.
 struct Protrusion {
     /// Radius less the distance from the centre to the surface.
     depth: f64,
@@ -33,11 +38,12 @@ struct Protrusion {
 impl Refinement {
     /// Whether a ball of a cell inside contains a point of the surface deeper than a fraction of the diagonal.
     pub fn has_protrusions(&self, depth: f64) -> bool {
-        !self.protrusions(depth * self.skin.diagonal).is_empty()
+        let depth = depth * self.skin.diagonal;
+        !self.protrusions(depth, depth).is_empty()
     }
 
-    /// Adds points until every such ball contains one of them. Each is at least as far from all vertices as three quarters
-    /// of the depth, so that the area of the surface bounds their number.
+    /// Adds points until every such ball contains one of them. Each is at least as far from all vertices of its plane as three
+    /// quarters of the depth, so that the area of the surface bounds their number.
     /// None is near to a place of `closed`, a point with a distance. The points are moved from flipped triangles to the surface
     /// itself.
     pub fn split_protrusions(
@@ -49,7 +55,8 @@ impl Refinement {
     ) {
         let first = self.skin.points.len();
         let depth = depth * self.skin.diagonal;
-        let mut protrusions = self.protrusions(if keeps_gaps { LEAST * depth } else { depth });
+        let least = if keeps_gaps { LEAST * depth } else { depth };
+        let mut protrusions = self.protrusions(least, depth);
         protrusions.retain(|ball| ball.depth > depth || self.closes_gap(ball, surface));
         // The deepest first.
         protrusions.sort_by(|a, b| b.depth.total_cmp(&a.depth));
@@ -78,7 +85,8 @@ impl Refinement {
             && outward.dot(nearest.point - tip).abs() > 0.5 * nearest.distance
     }
 
-    fn protrusions(&self, depth: f64) -> Vec<Protrusion> {
+    /// Balls deeper than `depth`, and circles with a radius above `wide`.
+    fn protrusions(&self, depth: f64, wide: f64) -> Vec<Protrusion> {
         let Self { skin, delaunay, is_inside, .. } = self;
         // A ball without vertices inside reaches beyond a triangle no deeper than the triangle's points are far from its
         // corners, which is at most the longest side divided by the root of three.
@@ -96,14 +104,18 @@ impl Refinement {
         let balls = spheres.par_iter().zip(is_inside).filter(|&(_, &is_inside)| is_inside);
         let found = balls.filter_map(|(sphere, _)| {
             let sphere = sphere.filter(|sphere| sphere.radius > depth)?;
-            let foot = tree.closest_within_from(sphere.centre, sphere.radius - depth, None)?;
-            Some(Protrusion {
-                depth: sphere.radius - foot.distance,
-                centre: sphere.centre,
-                radius: sphere.radius,
-                foot: foot.point,
-                triangle: large[foot.face as usize],
-            })
+            let nearest = tree.closest_within_from(sphere.centre, sphere.radius, None)?;
+            let (foot, triangle) = (nearest.point, large[nearest.face as usize]);
+            let [a, b, c] = corners[nearest.face as usize];
+            let outward = (b - a).cross(c - a).normalize_or_zero();
+            let height = outward.dot(sphere.centre - foot);
+            let width = (sphere.radius * sphere.radius - height * height).sqrt();
+            if height > STRAIGHT * nearest.distance && width > wide {
+                return Some(Protrusion { depth: width, centre: foot, radius: width, foot, triangle });
+            }
+            let Sphere { centre, radius } = sphere;
+            let reach = radius - nearest.distance;
+            (reach > depth).then_some(Protrusion { depth: reach, centre, radius, foot, triangle })
         });
         found.collect()
     }
