@@ -18,6 +18,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt;
+use std::iter::zip;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -30,10 +31,13 @@ use crate::Vec3;
 use crate::geometry::trees::morton_order;
 use crate::geometry::triangulation::Triangulation;
 use crate::geometry::{CellId, Delaunay, DisjointSets, VertexId};
-use crate::surface::{InsideTest, Side, TriangleBvh};
+use crate::surface::{InsideTest, PointGrid, Side, TriangleBvh};
 
 /// Circumcentres closer to the surface than this count as outside, in units of the diagonal.
 const GUARD_BAND: f64 = 1e-9;
+
+/// Distance from the corners of cells with a centre inside, a fraction of the diagonal, up to which cells are left out.
+const APART: f64 = 0.01;
 
 /// How a dual Voronoi polygon is cut into triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -99,7 +103,7 @@ impl CellSpheres {
     }
 
     /// The spheres of cells of which it is known whether they are inside. A cell whose centre is not
-    /// is left out if the topology allows it. Else its centre is moved into the cell, and its
+    /// is left out if the topology allows it and the solid is not thin there. Else its centre is moved into the cell, and its
     /// sphere shrunk to the surface.
     pub fn of_cells(
         delaunay: &Delaunay,
@@ -118,14 +122,21 @@ impl CellSpheres {
             (known.par_iter().zip(&sides).zip(&centres)).filter(|&((_, &side), &centre)| {
                 side != Side::Inside || surface.any_within(centre, GUARD_BAND)
             });
-        let mut outside: Vec<CellId> = outside.map(|((&cell, _), _)| CellId(cell)).collect();
+        let outside: Vec<CellId> = outside.map(|((&cell, _), _)| CellId(cell)).collect();
+        let is_thin = thin(delaunay, &known, &outside);
+        let (thin, mut outside): (Vec<_>, Vec<_>) =
+            zip(outside, is_thin).partition(|&(_, thin)| thin);
         leave_out(delaunay, &mut is_inside, &mut outside);
-        let moved = outside.into_par_iter().map(|cell| {
-            let corners = delaunay.vertices(cell).map(|v| delaunay.point(v));
-            let centre = nearest_within(corners, centre(cell.0));
-            (cell, Sphere::new(centre, surface.closest(centre).distance))
-        });
-        let moved = moved.collect();
+        let corners = |cell| delaunay.vertices(cell).map(|v| delaunay.point(v));
+        let thin = thin.into_par_iter().map(|(cell, _)| (cell, centroid(corners(cell))));
+        let outside = outside
+            .into_par_iter()
+            .map(|(cell, _)| (cell, nearest_within(corners(cell), centre(cell.0))));
+        let moved = thin
+            .chain(outside)
+            .map(|(cell, centre)| (cell, Sphere::new(centre, surface.closest(centre).distance)));
+        let mut moved: Vec<_> = moved.collect();
+        moved.sort_by_key(|&(cell, _)| cell);
         let conforming = Self::of_inside(delaunay, circumspheres, is_inside, moved);
         Self { is_conforming: true, ..conforming }
     }
@@ -179,12 +190,33 @@ impl CellSpheres {
     }
 }
 
+/// Whether each of the cells `outside` among those `known` to be in the solid is in a part that is too thin for the samples,
+/// as a plate: a corner of it is far from the corners of all cells with a centre inside.
+fn thin(delaunay: &Delaunay, known: &[u32], outside: &[CellId]) -> Vec<bool> {
+    let mut others = outside.iter().peekable();
+    let mut is_centred = vec![false; delaunay.point_count()];
+    for &cell in known {
+        if others.next_if(|other| other.0 == cell).is_none() {
+            delaunay.vertices(CellId(cell)).iter().for_each(|v| is_centred[v.index()] = true);
+        }
+    }
+    let mut grid = PointGrid::new(APART);
+    let centred = (0..).zip(&is_centred).filter(|(_, is_centred)| **is_centred);
+    centred.for_each(|(v, _)| grid.insert(delaunay.point(VertexId(v))));
+    let is_far = |v: VertexId| !is_centred[v.index()] && !grid.any_within(delaunay.point(v), APART);
+    outside.par_iter().map(|&cell| delaunay.vertices(cell).into_iter().any(is_far)).collect()
+}
+
 /// Takes cells off the inside without which the dual complex keeps its homotopy type. The list keeps the
 /// others.
-fn leave_out(triangulation: &Triangulation, is_inside: &mut [bool], cells: &mut Vec<CellId>) {
+fn leave_out(
+    triangulation: &Triangulation,
+    is_inside: &mut [bool],
+    cells: &mut Vec<(CellId, bool)>,
+) {
     loop {
         let before = cells.len();
-        cells.retain(|&cell| {
+        cells.retain(|&(cell, _)| {
             let is_tree = link_is_tree(triangulation, is_inside, cell);
             is_inside[cell.index()] = !is_tree;
             !is_tree
@@ -218,9 +250,13 @@ fn link_is_tree(triangulation: &Triangulation, is_inside: &[bool], cell: CellId)
 /// How much of its cell a centre may reach that is moved into it, from the centroid.
 const SHRUNK: f64 = 0.9;
 
+fn centroid(corners: [Vec3; 4]) -> Vec3 {
+    corners.into_iter().sum::<Vec3>() / 4.0
+}
+
 /// The point of a tetrahedron, shrunk a little, that is nearest to a point; its centroid for none.
 fn nearest_within(corners: [Vec3; 4], p: Vec3) -> Vec3 {
-    let centroid = corners.into_iter().sum::<Vec3>() / 4.0;
+    let centroid = centroid(corners);
     let shrunk = corners.map(|corner| centroid.lerp(corner, SHRUNK));
     let faces = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]].map(|face| face.map(|k| shrunk[k]));
     let nearest = TriangleBvh::from_triangles(&faces).ok().filter(|_| p.is_finite());

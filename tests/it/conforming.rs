@@ -2,6 +2,7 @@
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, betti};
+use medial::metrics::{Judge, JudgeOptions, Truth};
 use medial::shape::{Shape, ShapeOptions};
 use medial::surface::{Sampling, Side, TriMesh, read, validate};
 use medial_test_support::surfaces;
@@ -144,6 +145,24 @@ fn coarse_thin_and_sharp_solids_have_their_topology() {
         ("coarse torus", shapes::torus(6, 5)),
     ] {
         right_start(name, &mesh);
+    }
+}
+
+#[test]
+fn starts_of_coarse_plates_and_bars_are_close_to_them() {
+    for (k, half) in [0.1, 0.02, 0.005, 2e-3, 1e-3, 3e-4, 1e-5].into_iter().enumerate() {
+        let plate = shapes::cuboid(Vec3::new(-1.0, -0.8, -half), Vec3::new(1.0, 0.8, half));
+        let bar = scaled(plate.clone(), Vec3::new(1.0, 3.0 * half, 1.0));
+        for (name, mesh) in [("plate", plate), ("bar", bar)] {
+            let mesh = if k % 2 == 1 { turned(mesh, AXIS) } else { mesh };
+            let (_, start) = right_start(name, &mesh);
+            let shape = shape_of(&mesh, Sampling::default());
+            let (tree, inside) = (shape.surface_tree().unwrap(), shape.inside_test());
+            let options = JudgeOptions { samples: 4_000, volume_depth: 0, seed: 1 };
+            let judge = Judge::new(shape.mesh().clone(), tree, inside, Truth::default(), options);
+            let error = judge.distances(&start).unwrap().hausdorff;
+            assert!(error < 0.015, "{name} {half}: {error}");
+        }
     }
 }
 

@@ -6,7 +6,8 @@ use super::Refinement;
 use super::skin::{Place, Skin, key, sides};
 use crate::Vec3;
 use crate::complex::Sphere;
-use crate::surface::{PointGrid, TriangleBvh};
+use crate::geometry::CellId;
+use crate::surface::{InsideTest, PointGrid, Side, TriMesh, TriangleBvh};
 
 /// Distance to a segment below which a point moves onto it, as a share of the tolerated depth.
 const SNAP: f64 = 0.25;
@@ -85,8 +86,39 @@ impl Refinement {
             && outward.dot(nearest.point - tip).abs() > 0.5 * nearest.distance
     }
 
-    /// Balls deeper than `depth`, and circles with a radius above `wide`.
+    /// Balls deeper than `depth`, and circles with a radius above `wide` where the solid is thin.
     fn protrusions(&self, depth: f64, wide: f64) -> Vec<Protrusion> {
+        let found = self.all_protrusions(depth, wide);
+        let circles: Vec<CellId> = found.iter().filter_map(|&(cell, _)| cell).collect();
+        let mut is_thin = self.is_thin(&circles).into_iter();
+        let kept =
+            found.into_iter().filter(|(cell, _)| cell.is_none() || is_thin.next() == Some(true));
+        kept.map(|(_, protrusion)| protrusion).collect()
+    }
+
+    /// For each of some cells whether no corner of it is one of a cell inside that is centred inside.
+    fn is_thin(&self, cells: &[CellId]) -> Vec<bool> {
+        let Self { skin, delaunay, is_inside, .. } = self;
+        let corners = |cell: &CellId| delaunay.vertices(*cell).map(|v| v.index());
+        let mut is_asked = vec![false; skin.points.len()];
+        cells.iter().flat_map(corners).for_each(|v| is_asked[v] = true);
+        let is_near = |cell: &CellId| corners(cell).iter().any(|&v| is_asked[v]);
+        let around =
+            delaunay.finite_cells().filter(|cell| is_inside[cell.index()] && is_near(cell));
+        let centred = around.filter_map(|cell| Some((cell, delaunay.circumsphere(cell)?.0)));
+        let (around, centres): (Vec<CellId>, Vec<Vec3>) = centred.unzip();
+        let mesh = TriMesh { vertices: skin.points.clone(), faces: skin.triangles.clone() };
+        let mut is_centred = vec![false; skin.points.len()];
+        if !cells.is_empty() {
+            let sides = InsideTest::new(&mesh).sides(&centres);
+            let inside = around.iter().zip(sides).filter(|&(_, side)| side == Side::Inside);
+            inside.flat_map(|(cell, _)| corners(cell)).for_each(|v| is_centred[v] = true);
+        }
+        cells.iter().map(|cell| !corners(cell).iter().any(|&v| is_centred[v])).collect()
+    }
+
+    /// Balls and circles anywhere, circles with their cells.
+    fn all_protrusions(&self, depth: f64, wide: f64) -> Vec<(Option<CellId>, Protrusion)> {
         let Self { skin, delaunay, is_inside, .. } = self;
         // A ball without vertices inside reaches beyond a triangle no deeper than the triangle's points are far from its
         // corners, which is at most the longest side divided by the root of three.
@@ -101,21 +133,25 @@ impl Refinement {
         let corners: Vec<[Vec3; 3]> = large.iter().map(|&t| skin.corners(t)).collect();
         let Ok(tree) = TriangleBvh::from_triangles(&corners) else { return Vec::new() };
         let spheres = delaunay.circumspheres();
-        let balls = spheres.par_iter().zip(is_inside).filter(|&(_, &is_inside)| is_inside);
-        let found = balls.filter_map(|(sphere, _)| {
-            let sphere = sphere.filter(|sphere| sphere.radius > depth)?;
+        let all = (0..spheres.len() as u32).into_par_iter().zip(&spheres).zip(is_inside);
+        let balls = all.filter(|&(_, &is_inside)| is_inside).map(|(ball, _)| ball);
+        let found = balls.filter_map(|(cell, sphere)| {
+            let sphere = (*sphere).filter(|sphere| sphere.radius > depth)?;
             let nearest = tree.closest_within_from(sphere.centre, sphere.radius, None)?;
             let (foot, triangle) = (nearest.point, large[nearest.face as usize]);
-            let [a, b, c] = corners[nearest.face as usize];
-            let outward = (b - a).cross(c - a).normalize_or_zero();
-            let height = outward.dot(sphere.centre - foot);
-            let width = (sphere.radius * sphere.radius - height * height).sqrt();
-            if height > STRAIGHT * nearest.distance && width > wide {
-                return Some(Protrusion { depth: width, centre: foot, radius: width, foot, triangle });
-            }
             let Sphere { centre, radius } = sphere;
             let reach = radius - nearest.distance;
-            (reach > depth).then_some(Protrusion { depth: reach, centre, radius, foot, triangle })
+            if reach > depth {
+                let ball = Protrusion { depth: reach, centre, radius, foot, triangle };
+                return Some((None, ball));
+            }
+            let [a, b, c] = corners[nearest.face as usize];
+            let outward = (b - a).cross(c - a).normalize_or_zero();
+            let height = outward.dot(centre - foot);
+            let width = (radius * radius - height * height).sqrt();
+            let circle = Protrusion { depth: width, centre: foot, radius: width, foot, triangle };
+            let is_circle = height > STRAIGHT * nearest.distance && width > wide;
+            is_circle.then_some((Some(CellId(cell)), circle))
         });
         found.collect()
     }
