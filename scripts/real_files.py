@@ -59,7 +59,7 @@ def verdict(medial, path, axis):
 
 def served_wrapped(medial, path, folder):
     wrapped = f"{folder}/wrapped.off"
-    code, _, seconds = call([medial, "repair", path, "--wrap", "-o", wrapped, "--force", "--threads", "1"])
+    code, _, seconds = call([medial, "repair", path, "--wrap", "-o", wrapped, "--threads", "1"])
     if code != 0 or seconds > SECONDS:
         return False
     return verdict(medial, wrapped, f"{folder}/wrapped.ma")[0] == "served"

@@ -10,8 +10,8 @@
 //!    polygon, which is triangulated ([`DualTriangulation`]).
 //!
 //! In a triangulation that contains the surface ([`Conforming`](super::Conforming)) *inside* is the place of
-//! the cell. One with its centre outside is left out where the complex without it has the same homotopy type.
-//! Otherwise the centre is moved into the cell.
+//! the cell. One with its centre outside is left out where the complex without it has the same homotopy type, and
+//! the solid is not too thin for the samples. Otherwise the centre is moved into the cell.
 //!
 //! Coincident circumcentres are not merged: merging by position can close loops, and the published
 //! counts are those without merging.
@@ -102,7 +102,7 @@ impl CellSpheres {
         Self { in_guard_band, ..Self::of_inside(delaunay, circumspheres, is_inside, vec![]) }
     }
 
-    /// The spheres of cells of which it is known whether they are inside. A cell whose centre is not
+    /// The spheres of cells of which it is known whether they are inside, in normalised units. A cell whose centre is not
     /// is left out if the topology allows it and the solid is not thin there. Else its centre is moved into the cell, and its
     /// sphere shrunk to the surface.
     pub fn of_cells(

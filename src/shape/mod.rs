@@ -125,7 +125,7 @@ impl Triangulated {
                 let doubt = (missing > 0).then(|| {
                     format!(
                         "the initial medial mesh may have another topology than the solid: parts of the surface are too \
-                         close to each other for samples ({missing} faces)"
+                         close to each other for samples ({missing} faces); {ADVICE}"
                     )
                 });
                 Ok(Self { delaunay: Arc::new(delaunay), is_inside: Ok(is_inside), doubt })
@@ -152,6 +152,10 @@ const LEAST_BUDGET: usize = 20_000;
 
 /// Reach of a start beyond the surface, as a fraction of the diagonal, that users are warned of.
 const FAR_START: f64 = 0.02;
+
+/// What helps where parts of a surface are too close to each other.
+const ADVICE: &str =
+    "a wrap (`medial repair --wrap`) has no gaps narrower than 2 % of the diagonal";
 
 /// Number of spheres that share the deepest place found so far.
 const REACH_CHUNK: usize = 4_096;
@@ -503,7 +507,9 @@ impl Shape {
         let reach = self.reach().filter(|&reach| reach > FAR_START);
         remarks.extend(reach.map(|reach| {
             let percent = 100.0 * reach;
-            format!("spheres of the initial medial mesh reach {percent:.1} % of the diagonal beyond the surface")
+            format!(
+                "spheres of the initial medial mesh reach {percent:.1} % of the diagonal beyond the surface; {ADVICE}"
+            )
         }));
         remarks
     }

@@ -30,7 +30,8 @@
 //! 5. The cells on both sides of the surface's triangles are known from its orientation, and all others by
 //!    a flood through facets that are not on the surface. Flat cells with two facets in a patch are taken off.
 //! 6. A ball of a cell inside that reaches far beyond the surface, between vertices far apart, loses its place to the
-//!    surface point nearest to its centre. Then 1 to 5 follow again.
+//!    surface point nearest to its centre. So does the circle in which a ball that is centred beyond a plane meets it, where the
+//!    solid is thinner than the samples are apart. Then 1 to 5 follow again.
 //!
 //! # Deviations from the papers
 //! The papers keep the surface and flip nothing between patches. On twelve real meshes flips leave a ninth of the
