@@ -243,8 +243,7 @@ impl<'a> Comparison<'a> {
     }
 }
 
-/// What all results of a mesh are warned of, as of repairs of its surface, with the mesh; at most [`MOST_REMARKS`], and how
-/// many more.
+/// What all results of a mesh are warned of, as of repairs of its surface, with the mesh; at most 20, and how many more.
 pub fn remarks_of_meshes<'a>(records: impl IntoIterator<Item = &'a Record>) -> Vec<String> {
     let mut common: Vec<(&str, Vec<&str>)> = Vec::new();
     for record in records.into_iter().filter(|record| record.status.has_result()) {
@@ -267,7 +266,7 @@ pub fn remarks_of_meshes<'a>(records: impl IntoIterator<Item = &'a Record>) -> V
     remarks
 }
 
-/// Limit of [`remarks_of_meshes`].
+/// Limit of the remarks on meshes.
 const MOST_REMARKS: usize = 20;
 
 /// The record of the median Hausdorff error, where one without a result is infinite; of an even number the larger one.

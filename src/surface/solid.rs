@@ -122,8 +122,9 @@ fn resolved(
             return Some(loaded(found, repairs));
         }
     }
+    let mut separations = Vec::new();
     for pass in 0..PASSES {
-        let (mut edges, mut separations) = (0, None);
+        let (mut edges, mut separated) = (0, None);
         let before = volume(&mesh, unit);
         let found = arranged(&mesh)?;
         if pass == 0 && !is_region(&found, &mesh, unit) {
@@ -137,7 +138,7 @@ fn resolved(
         let mut found = examined(&mesh)?;
         if !is_solid(&found) {
             let (mut vertices, mut faces) = touching(mesh.clone());
-            separations = separate(&mut vertices, &mut faces);
+            separated = separate(&mut vertices, &mut faces);
             found = examined(&TriMesh { vertices, faces })?;
         }
         if found.refused.is_none() {
@@ -154,12 +155,16 @@ fn resolved(
         }
         if is_solid(&found) {
             repairs.push(Repair::ResolvedFaces { faces: replaced, by: found.mesh.faces.len() });
-            repairs.extend(separations);
+            repairs.extend(separations.into_iter().chain(separated));
             let distance = SHORT * diagonal;
             repairs.extend((edges > 0).then_some(Repair::ContractedEdges { edges, distance }));
             return Some(loaded(found, repairs));
         }
-        // The arrangement itself goes on: the check leaves out one of two opposite faces, which opens it.
+        // Else the arrangement itself goes on: the check leaves out one of two opposite faces, which opens it.
+        if found.refused.is_none() {
+            separations.extend(separated);
+            mesh = found.mesh;
+        }
     }
     None
 }
