@@ -247,7 +247,8 @@ impl<'a> Comparison<'a> {
 pub fn remarks_of_meshes<'a>(records: impl IntoIterator<Item = &'a Record>) -> Vec<String> {
     let mut common: Vec<(&str, Vec<&str>)> = Vec::new();
     for record in records.into_iter().filter(|record| record.status.has_result()) {
-        let own = record.warnings();
+        // Those of the evaluation are about each result.
+        let own: Vec<&str> = record.simplify.warnings.iter().map(String::as_str).collect();
         match common.iter_mut().find(|(mesh, _)| *mesh == record.mesh) {
             Some((_, known)) => known.retain(|warning| own.contains(warning)),
             None => common.push((&record.mesh, own)),
