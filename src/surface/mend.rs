@@ -90,13 +90,15 @@ fn mended(inspection: Inspection, options: MendOptions) -> Result<Loaded, Surfac
     let mut repairs = report.repairs;
     // The examination of the result repeats its warnings; a failed one has none of the reader.
     let mut warnings = if refused.is_some() { Vec::new() } else { report.warnings };
-    repairs.extend(keep(&mut mesh, options.components)?);
-    let TriMesh { mut vertices, mut faces } = mesh;
     if options.fill_holes {
+        let TriMesh { vertices, faces } = &mut mesh;
         // The loops of holes pass a vertex once only if its fans are separate.
-        repairs.extend(separate(&mut vertices, &mut faces));
-        repairs.extend(fill(&vertices, &mut faces)?);
+        repairs.extend(separate(vertices, faces));
+        repairs.extend(fill(vertices, faces)?);
     }
+    // After holes are filled: an open component bounds no cavity, and has none.
+    repairs.extend(keep(&mut mesh, options.components)?);
+    let TriMesh { vertices, faces } = mesh;
     let mended = inspected(PolygonSoup::of_triangles(&vertices, &faces)?)?;
     if mended.resolved.is_some() {
         warnings.clear();

@@ -612,6 +612,19 @@ fn a_part_is_kept_with_its_cavities() {
 }
 
 #[test]
+fn holes_are_filled_before_parts_are_chosen() {
+    let cavity = inverted(moved(lattice_cube(2), |v| 0.25 + 0.5 * v));
+    let far = moved(lattice_cube(1), |v| 0.5 * v + 3.0);
+    let open = joined(&[lattice_box(4, |p| p.z == 1.0), cavity.clone(), far]);
+    let whole = read(&joined(&[lattice_cube(4), cavity])).report;
+    let options = MendOptions { components: Components::Largest(1), ..FILL };
+    let mended = mend(&open, options).expect("a solid").report;
+    let volumes = [&mended, &whole].map(|report| report.volume.expect("closed"));
+    assert!((volumes[0] - volumes[1]).abs() < 1e-9, "{volumes:?}");
+    assert_eq!(mended.expected_betti, Some([1, 0, 1]));
+}
+
+#[test]
 fn surfaces_that_are_flat_after_the_repair_are_rejected() {
     let triangle = TriMesh { vertices: vec![Vec3::ZERO, Vec3::X, Vec3::Y], faces: vec![[0, 1, 2]] };
     let fault = mend(&triangle, FILL).expect_err("flat").fault;
