@@ -154,8 +154,8 @@ const LEAST_BUDGET: usize = 20_000;
 const FAR_START: f64 = 0.02;
 
 /// What helps where parts of a surface are too close to each other.
-const ADVICE: &str =
-    "a wrap (`medial repair --wrap`) has no gaps narrower than 2 % of the diagonal";
+const ADVICE: &str = "give more samples (`--sampling conforming:N`), or wrap the surface (`medial repair --wrap`), which \
+                      closes gaps narrower than 2 % of the diagonal";
 
 /// Number of spheres that share the deepest place found so far.
 const REACH_CHUNK: usize = 4_096;
