@@ -102,9 +102,9 @@ impl CellSpheres {
         Self { in_guard_band, ..Self::of_inside(delaunay, circumspheres, is_inside, vec![]) }
     }
 
-    /// The spheres of cells of which it is known whether they are inside, in normalised units. A cell whose centre is not
-    /// is left out if the topology allows it and the solid is not thin there. Else its centre is moved into the cell, and its
-    /// sphere shrunk to the surface.
+    /// The spheres of cells that are known to be inside or outside, in normalised units. A cell inside with its centre outside
+    /// is left out if the topology allows it and the solid is not thin there. Otherwise its centre is moved into the cell,
+    /// and its sphere shrunk to the surface.
     pub fn of_cells(
         delaunay: &Delaunay,
         mut is_inside: Vec<bool>,

@@ -160,7 +160,7 @@ fn resolved(
             repairs.extend((edges > 0).then_some(Repair::ContractedEdges { edges, distance }));
             return Some(loaded(found, repairs));
         }
-        // Else the arrangement itself goes on: the check leaves out one of two opposite faces, which opens it.
+        // Otherwise the next pass takes the arrangement itself. The check drops one of two opposite faces, which opens it.
         if found.refused.is_none() {
             separations.extend(separated);
             mesh = found.mesh;

@@ -97,7 +97,7 @@ fn overlapping_parts_stay_outward_and_touching_cavities_inward() {
 }
 
 /// Boxes of whole sides in some unit: the number of cells in their union, and their faces. Some boxes are inside out, but
-/// none that another one encloses, which could be a cavity.
+/// none that another one encloses, which could be a cavity. Corners are below `side`; all boxes have one `height`, or any.
 fn boxes(random: &mut Pcg64, unit: f64, side: i32, height: Option<i32>) -> (usize, TriMesh) {
     let count = random.random_range(2..6);
     let spans: Vec<[[i32; 3]; 2]> = (0..count)
@@ -582,7 +582,7 @@ fn the_largest_part_is_kept() {
 
 #[test]
 fn a_part_is_kept_with_its_cavities() {
-    // Hollow in a hollow one, next to a cube, of which one lacks a face.
+    // A hollow cube in the cavity of another, next to a solid cube, from which one face is taken later.
     let hollow = |r: f64| [shell(r), inverted(shell(0.9 * r))];
     let cube = moved(shell(1.0), |v| v + 9.0);
     let parts = [&hollow(4.0)[..], &hollow(2.0), &[cube]].concat();

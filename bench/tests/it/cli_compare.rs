@@ -294,7 +294,7 @@ fn faults_of_a_study_are_refused_before_any_run() {
 #[test]
 fn changes_of_a_solid_are_said_wherever_it_is_used() {
     let at = Folder::new();
-    // A cube in another becomes a cavity. One on a shelf far away keeps few digits.
+    // A cube in another becomes a cavity. A cube far from the origin loses digits in single precision.
     at.write("boss.off", cubes_off(&[([0.0; 3], 4.0), ([1.0; 3], 2.0)]));
     at.write("far.off", cubes_off(&[([1e6, 0.0, 0.0], 1.0)]));
     at.done("axis boss.off -o boss.ma -q");

@@ -98,6 +98,9 @@ impl Refinement {
 
     /// For each of some cells whether no corner of it is one of a cell inside that is centred inside.
     fn is_thin(&self, cells: &[CellId]) -> Vec<bool> {
+        if cells.is_empty() {
+            return Vec::new();
+        }
         let Self { skin, delaunay, is_inside, .. } = self;
         let corners = |cell: &CellId| delaunay.vertices(*cell).map(|v| v.index());
         let mut is_asked = vec![false; skin.points.len()];
@@ -109,11 +112,9 @@ impl Refinement {
         let (around, centres): (Vec<CellId>, Vec<Vec3>) = centred.unzip();
         let mesh = TriMesh { vertices: skin.points.clone(), faces: skin.triangles.clone() };
         let mut is_centred = vec![false; skin.points.len()];
-        if !cells.is_empty() {
-            let sides = InsideTest::new(&mesh).sides(&centres);
-            let inside = around.iter().zip(sides).filter(|&(_, side)| side == Side::Inside);
-            inside.flat_map(|(cell, _)| corners(cell)).for_each(|v| is_centred[v] = true);
-        }
+        let sides = InsideTest::new(&mesh).sides(&centres);
+        let inside = around.iter().zip(sides).filter(|&(_, side)| side == Side::Inside);
+        inside.flat_map(|(cell, _)| corners(cell)).for_each(|v| is_centred[v] = true);
         cells.iter().map(|cell| !corners(cell).iter().any(|&v| is_centred[v])).collect()
     }
 
