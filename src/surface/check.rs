@@ -229,14 +229,14 @@ impl Evidence<'_> {
     fn add_solid(&self, report: &mut SurfaceReport, shells: &[Shell]) {
         // Each closed shell has the Euler number 2 - 2 g; the sum over all shells gives the total genus.
         let genus = report.components as i64 - report.euler / 2;
-        let cavities = shells.iter().filter(|s| s.is_cavity()).count();
+        let cavities = shells.iter().filter(|s| s.is_cavity).count();
         report.genus = usize::try_from(genus).ok();
         report.expected_betti =
             report.genus.map(|genus| [report.components - cavities, genus, cavities]);
         let mut volume = Sum::default();
         for shell in shells {
             let size = shell.volume.abs();
-            volume.add(if shell.is_cavity() { -size } else { size });
+            volume.add(if shell.is_cavity { -size } else { size });
         }
         report.volume = self.unit.backward(volume.value(), 3);
         if !self.found.components.is_empty() {

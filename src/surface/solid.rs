@@ -8,14 +8,17 @@
 //!
 //! 1. *Weld*: vertices within the first of [`TOLERANCES`] that closes the surface, or the next one where 2 to 4 fail.
 //! 2. *Orient*: plane walls between bodies are left out, and bodies that touch taken apart (`parts.rs`). Then they are turned
-//!    outward, or inward where they are in an odd number of others. One that touches another from inside is turned with it.
+//!    outward, or inward where they are cavities.
 //! 3. *Resolve*: the winding number, compared with that of the input at points. Repeated while rounding makes faces cross.
 //! 4. *Separate*: parts that touch in a vertex or along an edge.
 
 use std::collections::HashSet;
 
-use manifold_rust::manifold::Manifold;
-use manifold_rust::types::{Error, MeshGL64, WindingRule};
+use manifold_rust::linalg;
+use manifold_rust::robust::assemble::assemble;
+use manifold_rust::robust::cells::{build_cells, extract, windings};
+use manifold_rust::robust::intersection_graph::build_graph;
+use manifold_rust::types::{OpType, WindingRule};
 
 use super::check::orient_and_examine;
 use super::intersections::intersections;
@@ -29,9 +32,8 @@ use super::topology::{Topology, repairs, shells, turn_over};
 use super::{Contraction, Folds, InsideTest, Inspection, Loaded, contract_short_edges};
 use crate::Vec3;
 
-/// Largest distances of welded vertices, as fractions of the diagonal of the bounding box. The first one comes before an
-/// exact weld, because the arrangement loses volume at nearer vertices.
-const TOLERANCES: [f64; 5] = [1e-12, 0.0, 1e-9, 1e-7, 1e-6];
+/// Largest distances of welded vertices, as fractions of the diagonal of the bounding box.
+const TOLERANCES: [f64; 4] = [0.0, 1e-9, 1e-7, 1e-6];
 
 /// Largest thickness of a wall between bodies, as a fraction of the diagonal.
 const WALL: f64 = 1e-6;
@@ -124,49 +126,81 @@ fn resolved(
     }
     let mut separations = Vec::new();
     for pass in 0..PASSES {
-        let (mut edges, mut separated) = (0, None);
-        let before = volume(&mesh, unit);
-        let found = arranged(&mesh)?;
-        if pass == 0 && !is_region(&found, &mesh, unit) {
+        let [simple, whole] = arranged(&mesh, unit)?;
+        let all = volume(&whole, unit);
+        let is_right = match pass {
+            0 => is_region(&whole, &mesh, unit),
+            // The first pass alone removes overlaps.
+            _ => (all - volume(&mesh, unit)).abs() <= LOSS * all,
+        };
+        if !is_right {
             return None;
         }
-        mesh = found;
-        // The first pass alone removes overlaps.
-        if pass > 0 && (volume(&mesh, unit) - before).abs() > LOSS * before.abs() {
-            return None;
-        }
-        let mut found = examined(&mesh)?;
-        if !is_solid(&found) {
-            let (mut vertices, mut faces) = touching(mesh.clone());
-            separated = separate(&mut vertices, &mut faces);
-            found = examined(&TriMesh { vertices, faces })?;
-        }
-        if found.refused.is_none() {
-            let limits = vec![SHORT * diagonal; found.mesh.vertices.len()];
-            let Contraction { mesh: shorter, contracted, dropped } =
-                contract_short_edges(&found.mesh, &limits, Folds::Refused);
-            let (all, left) = (volume(&found.mesh, unit), volume(&shorter, unit));
-            // A plate as thin as that must not lose its walls.
-            let is_alike = dropped == 0 && (all - left).abs() <= SLIGHT * all;
-            if let Some(shorter) = examined(&shorter).filter(|found| is_alike && is_solid(found)) {
-                edges = contracted;
-                found = shorter;
+        let mut next = None;
+        let is_alike =
+            reaches(&simple, &whole) && (volume(&simple, unit) - all).abs() <= LOSS * all;
+        for candidate in is_alike.then_some(simple).into_iter().chain([whole]) {
+            let Some(Closed { found, separated, contracted }) = closed(&candidate, unit, diagonal)
+            else {
+                continue;
+            };
+            if is_solid(&found) {
+                let by = found.mesh.faces.len();
+                repairs.push(Repair::ResolvedFaces { faces: replaced, by });
+                repairs.extend(separations.into_iter().chain(separated).chain(contracted));
+                return Some(loaded(found, repairs));
             }
+            // The next pass takes the arrangement itself where the check opened it: of two opposite faces it drops one.
+            next.get_or_insert(match found.refused {
+                None => (found.mesh, separated),
+                Some(_) => (candidate, None),
+            });
         }
-        if is_solid(&found) {
-            repairs.push(Repair::ResolvedFaces { faces: replaced, by: found.mesh.faces.len() });
-            repairs.extend(separations.into_iter().chain(separated));
-            let distance = SHORT * diagonal;
-            repairs.extend((edges > 0).then_some(Repair::ContractedEdges { edges, distance }));
-            return Some(loaded(found, repairs));
-        }
-        // Otherwise the next pass takes the arrangement itself. The check drops one of two opposite faces, which opens it.
-        if found.refused.is_none() {
-            separations.extend(separated);
-            mesh = found.mesh;
-        }
+        let separated;
+        (mesh, separated) = next?;
+        separations.extend(separated);
     }
     None
+}
+
+/// What an arrangement gives.
+struct Closed {
+    found: Inspection,
+    separated: Option<Repair>,
+    contracted: Option<Repair>,
+}
+
+/// An arrangement whose parts are separated where they touch, with short edges contracted.
+fn closed(arranged: &TriMesh, unit: Unit, diagonal: f64) -> Option<Closed> {
+    let (mut found, mut separated, mut contracted) = (examined(arranged)?, None, None);
+    if !is_solid(&found) {
+        let (mut vertices, mut faces) = touching(arranged.clone());
+        separated = separate(&mut vertices, &mut faces);
+        found = examined(&TriMesh { vertices, faces })?;
+    }
+    if found.refused.is_none() {
+        let distance = SHORT * diagonal;
+        let limits = vec![distance; found.mesh.vertices.len()];
+        let Contraction { mesh: shorter, contracted: edges, dropped } =
+            contract_short_edges(&found.mesh, &limits, Folds::Refused);
+        let (all, left) = (volume(&found.mesh, unit), volume(&shorter, unit));
+        // A plate as thin as that must not lose its walls.
+        let is_alike = dropped == 0 && (all - left).abs() <= SLIGHT * all;
+        if let Some(shorter) = examined(&shorter).filter(|found| is_alike && is_solid(found)) {
+            contracted = (edges > 0).then_some(Repair::ContractedEdges { edges, distance });
+            found = shorter;
+        }
+    }
+    Some(Closed { found, separated, contracted })
+}
+
+/// Whether a surface extends as far as another.
+fn reaches(found: &TriMesh, whole: &TriMesh) -> bool {
+    let [Some(found), Some((low, high))] = [found, whole].map(TriMesh::bounding_box) else {
+        return false;
+    };
+    let lost = (found.0 - low).abs().max((found.1 - high).abs()).max_element();
+    lost <= LOSS * (high - low).max_element()
 }
 
 /// Whether `found` bounds the region where the winding number of `surface` is at least 1, by points beside the faces of
@@ -295,17 +329,8 @@ fn oriented(built: Repaired) -> Option<(TriMesh, Vec<Repair>)> {
         return None;
     }
     let shells = shells(unit, &points, &apart, &topology, &found).ok()?;
-    let mut is_wrong = vec![false; shells.len()];
-    let mut outer_first: Vec<usize> = (0..shells.len()).collect();
-    outer_first.sort_by_key(|&k| shells[k].depth);
-    for k in outer_first {
-        let shell = &shells[k];
-        is_wrong[k] = match shell.touches {
-            // One that touches another from inside may be a pocket or a body in it: its orientation against that one decides.
-            Some(around) if shell.touched % 2 == 1 => is_wrong[around],
-            _ => !shell.is_flat() && !shell.is_right(),
-        };
-    }
+    let is_wrong: Vec<bool> =
+        shells.iter().map(|shell| !shell.is_flat() && !shell.is_right()).collect();
     let mut repairs = repairs(&turned, &is_wrong, &shells, &topology.component);
     let dropped = Repair::DroppedDuplicateFaces { faces: repeated };
     repairs.extend((repeated > 0).then_some(dropped));
@@ -334,38 +359,36 @@ fn drop_repeated(faces: &mut Vec<[u32; 3]>) {
     });
 }
 
-/// The boundary of the region with a winding number of at least 1. None if it does not reach as far as the surface.
-fn arranged(mesh: &TriMesh) -> Option<TriMesh> {
-    let (low, high) = mesh.bounding_box()?;
-    // `manifold-rust` merges vertices nearer than a share of the largest coordinate, and multiplies coordinates. The shift is
-    // exact: an axis is shifted only if its largest coordinate is at most twice the smallest.
-    let is_far = |axis: usize| {
-        let [near, far] = [low[axis], high[axis]];
-        near * far > 0.0 && near.abs().min(far.abs()) >= 0.5 * near.abs().max(far.abs())
+/// The boundary of the region with a winding number of at least 1: with few vertices in plane parts, where faces may overlap,
+/// and with all vertices where faces of the surface meet. None if nothing is left.
+fn arranged(mesh: &TriMesh, unit: Unit) -> Option<[TriMesh; 2]> {
+    let triangle = |face| {
+        mesh.triangle(face).map(|v| {
+            let Vec3 { x, y, z } = unit.forward(v);
+            linalg::Vec3::new(x, y, z)
+        })
     };
-    let origin = Vec3::from([0, 1, 2].map(|axis| if is_far(axis) { low[axis] } else { 0.0 }));
-    let shifted: Vec<Vec3> = mesh.vertices.iter().map(|&v| v - origin).collect();
-    let unit = Unit::of(&shifted);
-    let input = MeshGL64 {
-        num_prop: 3,
-        vert_properties: shifted.iter().flat_map(|&v| unit.forward(v).to_array()).collect(),
-        tri_verts: mesh.faces.iter().flatten().map(|&v| v.into()).collect(),
-        ..MeshGL64::default()
+    let triangles: Vec<_> = (0..mesh.faces.len()).map(triangle).collect();
+    let graph = build_graph(&triangles, &[]);
+    let complex = build_cells(&graph);
+    let windings = windings(&graph, &complex, [&triangles, &[]]);
+    let pieces = extract(&graph, &complex, &windings, OpType::Add, WindingRule::Positive);
+
+    let position = |[x, y, z]: [f64; 3]| unit.restore(Vec3::new(x, y, z));
+    let simple =
+        assemble(&pieces, &graph.verts, &graph.verts_f64, |_| true, None).get_mesh_gl64(-1);
+    let rows = simple.vert_properties.chunks_exact(simple.num_prop as usize);
+    let corners = simple.tri_verts.chunks_exact(3);
+    let simple = TriMesh {
+        vertices: rows.map(|row| position([row[0], row[1], row[2]])).collect(),
+        faces: corners.map(|t| [t[0], t[1], t[2]].map(|v| v as u32)).collect(),
     };
-    let soup = Manifold::from_mesh_gl64_robust(&input);
-    let solid = soup.rebuild_solid(WindingRule::Positive);
-    if [soup.status(), solid.status()] != [Error::NoError; 2] {
-        return None;
-    }
-    let output = solid.get_mesh_gl64(-1);
-    let width = output.num_prop as usize;
-    let position = |row: &[f64]| unit.restore(Vec3::new(row[0], row[1], row[2])) + origin;
-    let vertices = output.vert_properties.chunks_exact(width).map(position).collect();
-    let faces = output.tri_verts.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|v| v as u32));
-    let found = TriMesh { vertices, faces: faces.collect() };
-    let reaches = found.bounding_box()?;
-    let lost = (reaches.0 - low).abs().max((reaches.1 - high).abs()).max_element();
-    (lost <= LOSS * (high - low).max_element()).then_some(found)
+
+    let mut faces: Vec<[u32; 3]> = pieces.iter().map(|piece| piece.vi).collect();
+    let kept = compact(graph.verts_f64.len(), &mut faces).into_iter();
+    let kept = kept.map(|v| graph.verts_f64[v as usize]);
+    let vertices = kept.map(|p| position([p.x, p.y, p.z])).collect();
+    (!faces.is_empty()).then_some([simple, TriMesh { vertices, faces }])
 }
 
 #[cfg(test)]
@@ -388,8 +411,9 @@ mod tests {
         faces.extend(other.1);
         let both = TriMesh { vertices, faces };
         let unit = Unit::of(&both.vertices);
-        let union = arranged(&both).expect("an arrangement");
-        assert!(is_region(&union, &both, unit) && is_region(&one, &one, unit));
+        let [simple, whole] = arranged(&both, unit).expect("a body");
+        assert!([&simple, &whole].iter().all(|found| is_region(found, &both, unit)));
+        assert!(is_region(&one, &one, unit));
         assert!(!is_region(&one, &both, unit));
     }
 }

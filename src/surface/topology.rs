@@ -201,7 +201,8 @@ pub(super) fn corner_at(faces: &[[u32; 3]], half_edge: u32, vertex: u32) -> u32 
 // 1. Within a component all faces follow the first one (breadth over common edges).
 // 2. A component is turned by the sign of the volume it encloses. A volume within its own
 //    rounding error counts as none and is rejected.
-// 3. A component is a cavity if it lies in an odd number of others (see [`shells`]).
+// 3. A component is a cavity if it lies in an odd number of others. Where it touches one of them, or they overlap, its
+//    orientation against theirs decides.
 
 /// How a component is oriented, and how it should be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -210,20 +211,11 @@ pub(super) struct Shell {
     pub volume: f64,
     /// Bound on the rounding error of `volume`.
     pub rounding: f64,
-    /// Number of components around it.
-    pub depth: usize,
-    /// Number of those that it touches.
-    pub touched: usize,
-    /// The smallest of those.
-    pub touches: Option<usize>,
+    /// Whether it bounds a hole in the solid.
+    pub is_cavity: bool,
 }
 
 impl Shell {
-    /// Whether it bounds a hole in the solid.
-    pub fn is_cavity(&self) -> bool {
-        self.depth % 2 == 1
-    }
-
     /// Whether its two sides coincide, to double precision.
     pub fn is_flat(&self) -> bool {
         self.volume.abs() <= self.rounding
@@ -231,7 +223,7 @@ impl Shell {
 
     /// Whether its faces look away from the solid.
     pub fn is_right(&self) -> bool {
-        (self.volume > 0.0) != self.is_cavity()
+        (self.volume > 0.0) != self.is_cavity
     }
 }
 
@@ -246,12 +238,35 @@ pub(super) fn shells(
     let mut shells = volumes(points, faces, topology);
     let parts = Parts { unit, points, faces, component: &topology.component };
     let counts = depths(&parts, &topology.first_face, &intersections.components)?;
-    for (k, Around { apart, touched }) in counts.into_iter().enumerate() {
-        let size = |&other: &u32| shells[other as usize].volume.abs();
-        let touches = touched.iter().copied().min_by(|a, b| size(a).total_cmp(&size(b)));
-        let shell = &mut shells[k];
-        (shell.depth, shell.touched) = (apart.len() + touched.len(), touched.len());
-        shell.touches = touches.map(|other| other as usize);
+    let depth = |k: usize| counts[k].apart.len() + counts[k].touched.len();
+    let mut outer_first: Vec<usize> = (0..shells.len()).collect();
+    outer_first.sort_by_key(|&k| depth(k));
+    // Whether those around it lie one in the other.
+    let mut is_nested = vec![true; shells.len()];
+    for k in outer_first {
+        let Around { apart, touched } = &counts[k];
+        let around = || apart.iter().chain(touched).map(|&other| other as usize);
+        let is_against = |other: usize| (shells[other].volume > 0.0) != (shells[k].volume > 0.0);
+        let size = |other: &usize| shells[*other].volume.abs();
+        let nearest = touched.iter().map(|&other| other as usize);
+        let nearest = nearest.min_by(|a, b| size(a).total_cmp(&size(b)));
+        let innermost = around().max_by_key(|&other| depth(other));
+        is_nested[k] =
+            innermost.is_none_or(|other| is_nested[other] && depth(other) + 1 == depth(k));
+        shells[k].is_cavity = match (nearest, innermost) {
+            (_, None) => false,
+            // One that touches another from inside may be a pocket or a body in it.
+            (Some(nearest), _) if touched.len() % 2 == 1 => {
+                shells[nearest].is_cavity != is_against(nearest)
+            }
+            (_, Some(innermost)) if is_nested[k] => !shells[innermost].is_cavity,
+            _ => {
+                let bodies = || around().filter(|&other| !shells[other].is_cavity);
+                let innermost = bodies().max_by_key(|&body| depth(body));
+                // Where all of them have holes there is no place for another.
+                innermost.is_some_and(is_against) && 2 * bodies().count() > depth(k)
+            }
+        };
     }
     Ok(shells)
 }
@@ -307,7 +322,7 @@ pub(super) fn repairs(
         let whole = wrong.get(index).is_some_and(|&w| w);
         match (turned, whole) {
             (0, false) => {}
-            (0, true) if shells[index].is_cavity() => inward += 1,
+            (0, true) if shells[index].is_cavity => inward += 1,
             (0, true) => outward += 1,
             (_, false) => reoriented += turned,
             // Turned twice is not turned: only the other faces of the component changed.
@@ -340,9 +355,7 @@ fn volumes(points: &[Vec3], faces: &[[u32; 3]], topology: &Topology) -> Vec<Shel
             volume: sum.value() / 6.0,
             // Each determinant is off by at most some 10 roundings of the product of lengths.
             rounding: 16.0 * f64::EPSILON * size / 6.0,
-            depth: 0,
-            touched: 0,
-            touches: None,
+            is_cavity: false,
         })
         .collect()
 }

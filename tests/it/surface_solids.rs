@@ -139,7 +139,6 @@ fn boxes(random: &mut Pcg64, unit: f64, side: i32, height: Option<i32>) -> (usiz
 #[test]
 fn boxes_that_touch_and_overlap_have_the_volume_of_their_union() {
     let mut random = Pcg64::seed_from_u64(7);
-    let (mut refused, mut cases) = (0, 0);
     for case in 0..160 {
         let unit = [1.0, 1.0, 3e-110, 7e40][case % 4];
         let (cells, mut mesh) = boxes(&mut random, unit, 4, None);
@@ -149,28 +148,90 @@ fn boxes_that_touch_and_overlap_have_the_volume_of_their_union() {
             let mended = inspected.clone().mend(MendOptions::default());
             let solid = inspected.solid();
             assert_eq!(solid, mended, "case {case}");
-            let mesh = solid.ok()?.mesh;
+            let mesh = solid.expect("a solid").mesh;
             let six = |face| {
                 let [a, b, c] = mesh.triangle(face).map(|v| v / unit);
                 a.dot(b.cross(c))
             };
-            Some((0..mesh.faces.len()).map(six).sum::<f64>() / 6.0)
+            (0..mesh.faces.len()).map(six).sum::<f64>() / 6.0
         };
         let first = volume(&mesh);
         mesh.faces.shuffle(&mut random);
         let second = volume(&mesh);
-        cases += 1;
-        let (Some(first), Some(second)) = (first, second) else {
-            assert_eq!(first, second, "case {case}: refused in one order");
-            refused += 1;
-            continue;
-        };
         // Parts that touch are drawn apart by a thousandth of their size.
         for volume in [first, second] {
             assert!((volume - cells as f64).abs() < 5e-3 * cells as f64, "case {case}: {volume}");
         }
     }
-    assert!(refused <= cases / 50, "{refused} of {cases} refused");
+}
+
+#[test]
+fn plain_boxes_with_faces_in_common_planes_are_one_solid() {
+    let three = [
+        [[[1, 0, 1], [3, 3, 4]], [[0, 4, 2], [6, 5, 6]], [[3, 2, 1], [6, 6, 3]]],
+        [[[1, 0, 1], [4, 5, 5]], [[0, 1, 2], [6, 5, 5]], [[0, 3, 0], [1, 6, 6]]],
+    ];
+    for [a, b, c] in three {
+        let parts = [a, b, c].map(|span| {
+            let [low, high] = span.map(|corner| Vec3::from(corner.map(f64::from)));
+            cuboid(low, high)
+        });
+        let report = read(&joined(&parts)).report;
+        assert!(!report.self_intersecting, "{:?}", report.warnings);
+    }
+}
+
+#[test]
+fn a_cavity_is_where_those_of_all_bodies_are() {
+    let mut random = Pcg64::seed_from_u64(17);
+    for case in 0..200 {
+        let mut span = |low: [i32; 3], high: [i32; 3]| {
+            let pairs = [0, 1, 2].map(|k| {
+                let from = random.random_range(low[k]..high[k]);
+                [from, random.random_range(from + 1..=high[k])]
+            });
+            [pairs.map(|pair| pair[0]), pairs.map(|pair| pair[1])]
+        };
+        let bodies: Vec<[[[i32; 3]; 2]; 2]> = (0..2 + case % 2)
+            .map(|shift| {
+                // None holds another.
+                let outer = [[shift, shift, 2 - shift], [8 + shift, 8 + shift, 10 - shift]];
+                [outer, span(outer[0].map(|x| x + 1), outer[1].map(|x| x - 1))]
+            })
+            .collect();
+        let holds = |[low, high]: [[i32; 3]; 2], cell: [i32; 3]| {
+            (0..3).all(|k| low[k] <= cell[k] && cell[k] < high[k])
+        };
+        let cells = (0..1000).map(|i| [i % 10, i / 10 % 10, i / 100]);
+        let winding = |cell: [i32; 3]| -> i32 {
+            let of = |[outer, cavity]: &[[[i32; 3]; 2]; 2]| {
+                i32::from(holds(*outer, cell)) - i32::from(holds(*cavity, cell))
+            };
+            bodies.iter().map(of).sum()
+        };
+        let expected = cells.filter(|&cell| winding(cell) > 0).count() as f64;
+        let parts: Vec<TriMesh> = bodies
+            .iter()
+            .flat_map(|shells| {
+                let [outer, cavity] = shells.map(|span| {
+                    let [low, high] = span.map(|corner| Vec3::from(corner.map(f64::from)));
+                    cuboid(low, high)
+                });
+                [outer, inverted(cavity)]
+            })
+            .collect();
+        let both = joined(&parts);
+        for mesh in [inverted(both.clone()), both] {
+            let Loaded { report, mesh } = read(&mesh);
+            let volume = report.volume.expect("closed");
+            assert!(
+                (volume - expected).abs() < 5e-3 * expected,
+                "case {case}: {volume} for {expected}, {:?}\n{bodies:?}\n{}",
+                report.repairs,
+                mesh.faces.len()
+            );
+        }
+    }
 }
 
 #[test]
@@ -215,7 +276,6 @@ fn bodies(random: &mut Pcg64, most: usize) -> (usize, TriMesh) {
 #[test]
 fn bodies_with_common_vertices_have_the_volume_of_their_union() {
     let mut random = Pcg64::seed_from_u64(11);
-    let mut refused = 0;
     for case in 0..400 {
         let (cells, mut mesh) = bodies(&mut random, 4);
         mesh.faces.shuffle(&mut random);
@@ -225,22 +285,19 @@ fn bodies_with_common_vertices_have_the_volume_of_their_union() {
         let off = to_off(&mesh);
         let solid =
             surface::inspect_bytes("bodies.off", off.as_bytes()).expect("a surface").solid();
-        let Ok(Loaded { mesh, report }) = solid else {
-            refused += 1;
-            continue;
-        };
+        let Loaded { mesh, report } = solid.expect("a solid");
         let volume = report.volume.expect("closed");
         assert!(
             (volume - cells as f64).abs() < 5e-3 * cells as f64,
             "case {case}: {volume} for {cells}\n{off}"
         );
-        let is_moved = mesh.vertices.iter().any(|v| v.fract() != Vec3::ZERO);
+        // Diagonals of squares cross in their middle.
+        let is_moved = mesh.vertices.iter().any(|&v| (2.0 * v).fract() != Vec3::ZERO);
         let is_named = report.repairs.iter().any(|repair| {
             matches!(repair, Repair::SeparatedVertices { .. } | Repair::ContractedEdges { .. })
         });
         assert_eq!(is_moved, is_named, "case {case}: {:?}\n{off}", report.repairs);
     }
-    assert!(refused <= 12, "{refused} refused");
 }
 
 #[test]
