@@ -241,31 +241,23 @@ pub(super) fn shells(
     let depth = |k: usize| counts[k].apart.len() + counts[k].touched.len();
     let mut outer_first: Vec<usize> = (0..shells.len()).collect();
     outer_first.sort_by_key(|&k| depth(k));
-    // Whether those around it lie one in the other.
+    // Whether those around it lie one in the other, without contact.
     let mut is_nested = vec![true; shells.len()];
     for k in outer_first {
         let Around { apart, touched } = &counts[k];
         let around = || apart.iter().chain(touched).map(|&other| other as usize);
-        let is_against = |other: usize| (shells[other].volume > 0.0) != (shells[k].volume > 0.0);
-        let size = |other: &usize| shells[*other].volume.abs();
-        let nearest = touched.iter().map(|&other| other as usize);
-        let nearest = nearest.min_by(|a, b| size(a).total_cmp(&size(b)));
-        let innermost = around().max_by_key(|&other| depth(other));
+        let Some(innermost) = around().max_by_key(|&other| depth(other)) else { continue };
         is_nested[k] =
-            innermost.is_none_or(|other| is_nested[other] && depth(other) + 1 == depth(k));
-        shells[k].is_cavity = match (nearest, innermost) {
-            (_, None) => false,
-            // One that touches another from inside may be a pocket or a body in it.
-            (Some(nearest), _) if touched.len() % 2 == 1 => {
-                shells[nearest].is_cavity != is_against(nearest)
-            }
-            (_, Some(innermost)) if is_nested[k] => !shells[innermost].is_cavity,
-            _ => {
-                let bodies = || around().filter(|&other| !shells[other].is_cavity);
-                let innermost = bodies().max_by_key(|&body| depth(body));
-                // Where all of them have holes there is no place for another.
-                innermost.is_some_and(is_against) && 2 * bodies().count() > depth(k)
-            }
+            touched.is_empty() && is_nested[innermost] && depth(innermost) + 1 == depth(k);
+        shells[k].is_cavity = if is_nested[k] {
+            !shells[innermost].is_cavity
+        } else {
+            let bodies = || around().filter(|&other| !shells[other].is_cavity);
+            let body = bodies().max_by_key(|&body| depth(body));
+            let is_turned =
+                body.is_some_and(|body| (shells[body].volume > 0.0) != (shells[k].volume > 0.0));
+            // Where all bodies have a hole there is no place for another.
+            is_turned && 2 * bodies().count() > depth(k)
         };
     }
     Ok(shells)
