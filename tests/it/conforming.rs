@@ -4,7 +4,7 @@ use medial::Vec3;
 use medial::complex::{MedialMesh, betti};
 use medial::metrics::{Judge, JudgeOptions, Truth};
 use medial::shape::{Shape, ShapeOptions};
-use medial::surface::{Sampling, Side, TriMesh, read, validate};
+use medial::surface::{Format, Sampling, Side, TriMesh, read, read_bytes, validate};
 use medial_test_support::surfaces;
 use rand::prelude::*;
 use rand_pcg::Pcg64;
@@ -157,13 +157,43 @@ fn starts_of_coarse_plates_and_bars_are_close_to_them() {
             let mesh = if k % 2 == 1 { turned(mesh, AXIS) } else { mesh };
             let (_, start) = right_start(name, &mesh);
             let shape = shape_of(&mesh, Sampling::default());
-            let (tree, inside) = (shape.surface_tree().unwrap(), shape.inside_test());
-            let options = JudgeOptions { samples: 4_000, volume_depth: 0, seed: 1 };
-            let judge = Judge::new(shape.mesh().clone(), tree, inside, Truth::default(), options);
-            let error = judge.distances(&start).unwrap().hausdorff;
+            let error = error_of(&shape, &start);
             assert!(error < 0.015, "{name} {half}: {error}");
         }
     }
+}
+
+#[test]
+fn starts_of_thin_walls_side_by_side_are_close_to_them() {
+    let wall = |low: [f64; 3], high: [f64; 3]| shapes::cuboid(low.into(), high.into());
+    let base = wall([0.0, 0.0, 0.0], [1.0, 1.0, 0.1]);
+    let fin = |k: u32| {
+        let x = 0.05 + 0.12 * f64::from(k);
+        wall([x, 0.02, 0.05], [x + 0.01, 0.98, 0.5])
+    };
+    let shelf = |k: u32| {
+        let z = 0.3 * f64::from(k);
+        wall([0.005, 0.02, z], [0.995, 0.38, z + 0.01])
+    };
+    let side = |x: f64| wall([x, 0.0, -0.1], [x + 0.01, 0.4, 1.3]);
+    let fins: Vec<TriMesh> = (0..8).map(fin).chain([base]).collect();
+    let shelves: Vec<TriMesh> = (0..5).map(shelf).chain([side(0.0), side(0.99)]).collect();
+    for (name, parts) in [("fins", fins), ("shelves", shelves)] {
+        let off = shapes::to_off(&shapes::joined(&parts));
+        let solid = read_bytes(off.as_bytes(), Format::Off).expect("a solid");
+        let (_, start) = right_start(name, &solid.mesh);
+        let shape = shape_of(&solid.mesh, Sampling::default());
+        let far = error_of(&shape, &start);
+        assert!(far < 0.02, "{name}: {far}");
+    }
+}
+
+/// The two-sided Hausdorff error of a start.
+fn error_of(shape: &Shape, start: &MedialMesh) -> f64 {
+    let (tree, inside) = (shape.surface_tree().unwrap(), shape.inside_test());
+    let options = JudgeOptions { samples: 4_000, volume_depth: 0, seed: 1 };
+    let judge = Judge::new(shape.mesh().clone(), tree, inside, Truth::default(), options);
+    judge.distances(start).unwrap().hausdorff
 }
 
 /// Unions of random cells of a grid of random planes, without edges and vertices where they only touch.

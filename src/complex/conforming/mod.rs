@@ -282,7 +282,7 @@ impl Refinement {
         let mut distance = closest;
         for _ in 0..APPROACHES {
             let give_ups = self.give_ups + 1;
-            let way = Way { bends: false, slack: 0, give_ups, rounds: ROUNDS, ..self.way };
+            let way = Way { bends: false, give_ups, rounds: ROUNDS, ..self.way };
             let mut next = Self { way, ..self.clone() };
             next.split_protrusions(CLOSE, surface, &closed, keeps_gaps);
             let (before, after) = (self.skin.points.len(), next.skin.points.len());
