@@ -63,6 +63,9 @@ const ROUNDS: usize = 1_000;
 /// Ratio of the number of points to that with the fewest missing triangles, above which patches are given up.
 const GROWTH: usize = 2;
 
+/// Points in addition to these after which patches are given up.
+const SLACK: usize = 20_000;
+
 /// Limit of rounds against balls that reach far beyond the surface. Few shapes need ten.
 const APPROACHES: usize = 40;
 
@@ -73,9 +76,6 @@ struct Way {
     flat: f64,
     /// Whether edges between patches are flipped.
     bends: bool,
-    /// Number of points, in addition to [`GROWTH`] times those with which the fewest triangles were missing, after which
-    /// patches are given up.
-    slack: usize,
     /// Limit of times that patches are given up.
     give_ups: usize,
     /// Limit of rounds after that with the fewest missing triangles.
@@ -85,9 +85,9 @@ struct Way {
 /// Ways that are tried in turn: the first for coarse surfaces alone, the last for surfaces with details below the rounding of
 /// files of six digits.
 const WAYS: [Way; 3] = [
-    Way { flat: 1e-6, bends: false, slack: 20_000, give_ups: 0, rounds: 100 },
-    Way { flat: 1e-6, bends: true, slack: 20_000, give_ups: 4, rounds: ROUNDS },
-    Way { flat: 1e-10, bends: false, slack: 20_000, give_ups: 4, rounds: ROUNDS },
+    Way { flat: 1e-6, bends: false, give_ups: 0, rounds: 100 },
+    Way { flat: 1e-6, bends: true, give_ups: 4, rounds: ROUNDS },
+    Way { flat: 1e-10, bends: false, give_ups: 4, rounds: ROUNDS },
 ];
 
 /// Length of an edge, as a fraction of the surface's diagonal, above which a surface is coarse.
@@ -323,7 +323,7 @@ impl Refinement {
         // The state with the fewest missing triangles.
         let mut best: Option<Box<Snapshot>> = None;
         let (mut least, mut limit, mut since) = (usize::MAX, 0, self.rounds);
-        let Way { bends, slack, give_ups, rounds, .. } = self.way;
+        let Way { bends, give_ups, rounds, .. } = self.way;
         loop {
             let mut stars = Stars::of(&self.delaunay);
             let skin = &mut self.skin;
@@ -345,7 +345,7 @@ impl Refinement {
                 return Ok(());
             }
             if open.len() < least {
-                (least, limit) = (open.len(), GROWTH * skin.points.len() + slack);
+                (least, limit) = (open.len(), GROWTH * skin.points.len() + SLACK);
                 since = self.rounds;
                 let (skin, delaunay) = (skin.clone(), self.delaunay.clone());
                 best = Some(Box::new(Snapshot { skin, delaunay, missing: missing.clone() }));
