@@ -541,6 +541,21 @@ mod tests {
     }
 
     #[test]
+    fn an_infinite_limit_reaches_every_leaf_once() {
+        for count in 1..60 {
+            let items = boxes((0..count).map(|i| Vec3::X * f64::from(i * i)), 0.1);
+            let wide = wide::WideTree::new(&Tree::build(&items, PLAN));
+            let query = wide.query(Vec3::X).expect("near");
+            let mut seen = vec![0; wide.leaves().len()];
+            wide.nearest(&query, f32::INFINITY, |leaf, _| {
+                seen[leaf] += 1;
+                f32::INFINITY
+            });
+            assert!(seen.iter().all(|&times| times == 1), "{count}: {seen:?}");
+        }
+    }
+
+    #[test]
     fn geometric_progressions_are_halved() {
         let items = boxes((0..2000).map(|i| Vec3::X * 0.5_f64.powi(i / 2)), 0.0);
         let tree = Tree::build(&items, PLAN);

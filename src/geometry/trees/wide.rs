@@ -240,10 +240,12 @@ impl WideTree {
     #[inline]
     pub(super) fn search(
         &self,
-        mut limit: f32,
+        limit: f32,
         bounds: impl Fn(usize, Lanes) -> Lanes,
         mut visit: impl FnMut(usize, f32) -> f32,
     ) {
+        // An infinite one would reach the lanes without a child.
+        let mut limit = limit.min(f32::MAX);
         let mut stack = [(0.0_f32, 0_u32); 3 * MAX_DEPTH + 4];
         let mut height = 0;
         let mut current = self.root;
@@ -269,7 +271,7 @@ impl WideTree {
                     height += 1;
                 }
             } else {
-                limit = visit((current & !LEAF) as usize, limit);
+                limit = visit((current & !LEAF) as usize, limit).min(f32::MAX);
             }
             loop {
                 if height == 0 {
