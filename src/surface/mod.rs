@@ -11,6 +11,7 @@
 
 mod check;
 mod closest;
+mod contacts;
 mod contract;
 mod creases;
 mod format;
@@ -222,7 +223,10 @@ fn inspected(mut soup: soup::PolygonSoup) -> Result<Inspection, Fault> {
     let repaired = repair::repair(&mut soup)?;
     let unit = repaired.unit;
     let mut inspection = check::orient_and_examine(repaired);
-    if inspection.refused.is_some() || inspection.report.self_intersecting {
+    if inspection.refused.is_some()
+        || inspection.report.self_intersecting
+        || solid::has_contacts(&inspection.mesh, unit)
+    {
         inspection.resolved = solid::resolve(&soup, unit, &inspection).map(Box::new);
         if inspection.resolved.is_none() && inspection.refused.is_none() {
             let why = "the intersections were not resolved, so that results may be wrong; wrap the surface (`medial repair \

@@ -9,8 +9,9 @@
 //! 1. *Weld*: vertices within the first of [`TOLERANCES`] that closes the surface, or the next one where 2 to 4 fail.
 //! 2. *Orient*: plane walls between bodies are left out, and bodies that touch taken apart (`parts.rs`). Then they are turned
 //!    outward, or inward where they are cavities.
-//! 3. *Resolve*: the winding number, compared with that of the input at points. Repeated while rounding makes faces cross.
-//! 4. *Separate*: parts that touch in a vertex or along an edge.
+//! 3. *Join*: bodies that stand on each other to within rounding (`contacts.rs`).
+//! 4. *Resolve*: the winding number, compared with that of the input at points. Repeated while rounding makes faces cross.
+//! 5. *Separate*: parts that touch in a vertex or along an edge.
 
 use std::collections::HashSet;
 
@@ -21,6 +22,7 @@ use manifold_rust::robust::intersection_graph::build_graph;
 use manifold_rust::types::{OpType, WindingRule};
 
 use super::check::orient_and_examine;
+use super::contacts::{Contact, contacts};
 use super::intersections::intersections;
 use super::mend::separate;
 use super::mesh::{TriMesh, Unit};
@@ -108,9 +110,25 @@ fn resolved(
     });
     repairs.extend(weld.into_iter().chain(walls).chain(turns));
     let replaced = mesh.faces.len();
+    let (mut scaled, contacts) = contacts_of(&mesh, unit);
+    let is_joined = !contacts.is_empty();
+    for contact in contacts {
+        let level = contact.level(&scaled);
+        let [_, whole] = arranged(&level, Unit::of(&level.vertices))?;
+        scaled = contact.back(whole);
+    }
+    if is_joined {
+        scaled.vertices.iter_mut().for_each(|v| *v = unit.restore(*v));
+        if !is_region(&scaled, &mesh, unit) {
+            return None;
+        }
+        mesh = scaled;
+    }
     // A weld may have been all that was missing.
     let found = examined(&mesh)?;
     if is_solid(&found) {
+        let by = found.mesh.faces.len();
+        repairs.extend(is_joined.then_some(Repair::ResolvedFaces { faces: replaced, by }));
         return Some(loaded(found, repairs));
     }
     let is_wall = |repair: &Repair| matches!(repair, Repair::DroppedDuplicateFaces { .. });
@@ -120,6 +138,8 @@ fn resolved(
         let separated = separate(&mut vertices, &mut faces);
         let found = examined(&TriMesh { vertices, faces })?;
         if is_solid(&found) {
+            let by = found.mesh.faces.len();
+            repairs.extend(is_joined.then_some(Repair::ResolvedFaces { faces: replaced, by }));
             repairs.extend(separated);
             return Some(loaded(found, repairs));
         }
@@ -201,6 +221,19 @@ fn reaches(found: &TriMesh, whole: &TriMesh) -> bool {
     };
     let lost = (found.0 - low).abs().max((found.1 - high).abs()).max_element();
     lost <= LOSS * (high - low).max_element()
+}
+
+/// Whether bodies stand on each other in planes that rounding has parted.
+pub(super) fn has_contacts(mesh: &TriMesh, unit: Unit) -> bool {
+    !contacts_of(mesh, unit).1.is_empty()
+}
+
+/// The surface in scaled units, and those planes of it.
+fn contacts_of(mesh: &TriMesh, unit: Unit) -> (TriMesh, Vec<Contact>) {
+    let scaled = TriMesh { vertices: unit.forward_all(&mesh.vertices), faces: mesh.faces.clone() };
+    let extent = scaled.bounding_box().map_or(0.0, |(low, high)| (high - low).length());
+    let contacts = contacts(&scaled, WALL * extent);
+    (scaled, contacts)
 }
 
 /// Whether `found` bounds the region where the winding number of `surface` is at least 1, by points beside the faces of

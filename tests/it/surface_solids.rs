@@ -338,6 +338,37 @@ fn walls_cut_in_two_ways_and_rounded_are_no_gaps() {
 }
 
 #[test]
+fn bodies_that_stand_on_each_other_at_an_angle_are_joined() {
+    let plate = || cuboid(Vec3::new(-2.0, -2.0, 0.0), Vec3::new(2.0, 2.0, 1.0));
+    let on_top = |low: [f64; 2], high: [f64; 2]| {
+        cuboid(Vec3::new(low[0], low[1], 1.0), Vec3::new(high[0], high[1], 3.0))
+    };
+    let pillar = vec![plate(), on_top([-1.0, -1.0], [1.0, 0.5])];
+    let fins = (0..4).map(|k| f64::from(k) - 1.75);
+    let fins = fins.map(|x| on_top([x, -1.5], [x + 0.25, 1.5])).chain([plate()]).collect();
+    // Nothing of either lies on a corner or an edge of the other.
+    let bars = vec![
+        cuboid(Vec3::new(-3.0, -0.5, 0.0), Vec3::new(3.0, 0.5, 1.0)),
+        cuboid(Vec3::new(-0.5, -3.0, 1.0), Vec3::new(0.5, 3.0, 2.0)),
+    ];
+    let mut random = Pcg64::seed_from_u64(19);
+    for (name, parts, area) in
+        [("pillar", pillar, 62.0), ("fins", fins, 100.0), ("bars", bars, 50.0)]
+    {
+        for case in 0..20 {
+            let axis = Vec3::from([(); 3].map(|()| random.random_range(-1.0..1.0))).normalize();
+            let turn = DMat3::from_axis_angle(axis, random.random_range(0.0..TAU));
+            let single = |v: Vec3| Vec3::from(v.to_array().map(|x| f64::from(x as f32)));
+            let round = |v: Vec3| if case % 2 == 0 { turn * v } else { single(turn * v) };
+            let report = read(&moved(joined(&parts), round)).report;
+            let found = report.area.expect("an area");
+            assert_eq!(report.expected_betti, Some([1, 0, 0]), "{name} {case}: {report:?}");
+            assert!((found - area).abs() < 1e-4 * area, "{name} {case}: {found} for {area}");
+        }
+    }
+}
+
+#[test]
 fn thin_and_distant_plates_are_kept() {
     let cube = cuboid(Vec3::splat(-0.5), Vec3::splat(0.5));
     for (thickness, shift) in [(1e-4, 0.0), (1e-6, 1e6), (1e-3, 1e10)] {
