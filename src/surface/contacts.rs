@@ -14,7 +14,7 @@ use crate::Vec3;
 use crate::geometry::TriangleTree;
 use crate::geometry::predicates::orient3d;
 
-/// Limit of the planes of a surface.
+/// Number of planes from which on they are parts of curved sheets, which are left as they are.
 const MOST_PLANES: usize = 64;
 
 /// Largest cosine of the angle between the normals of faces that look at each other.
@@ -30,8 +30,8 @@ pub(super) struct Contact {
     most: f64,
 }
 
-/// The planes where faces of two components look at each other, no farther than `most` apart and not exactly in one
-/// plane, of a surface in scaled units.
+/// The planes where faces of two bodies look at each other, no farther than `most` apart and not exactly in one plane, of an
+/// oriented surface in scaled units. Cavities are left out: their walls may be as thin as that.
 pub(super) fn contacts(mesh: &TriMesh, most: f64) -> Vec<Contact> {
     let Topology { component, first_face, .. } = Topology::new(mesh.vertices.len(), &mesh.faces);
     let mut found: Vec<Contact> = Vec::new();
@@ -39,17 +39,26 @@ pub(super) fn contacts(mesh: &TriMesh, most: f64) -> Vec<Contact> {
         return found;
     }
     let corners = |face: u32| mesh.triangle(face as usize);
+    let mut volumes = vec![0.0; first_face.len()];
+    for (face, &own) in component.iter().enumerate() {
+        let origin = mesh.vertices[mesh.faces[first_face[own as usize] as usize][0] as usize];
+        let [a, b, c] = mesh.triangle(face).map(|p| p - origin);
+        volumes[own as usize] += a.dot(b.cross(c));
+    }
+    let is_body = |face: u32| volumes[component[face as usize] as usize] > 0.0;
     let tree = TriangleTree::new(0..mesh.faces.len() as u32, corners);
     for face in 0..mesh.faces.len() as u32 {
         let [a, b, c] = corners(face);
         let own = normal([a, b, c]);
-        let Some(up) = own.try_normalize() else { continue };
+        let Some(up) = own.try_normalize().filter(|_| is_body(face)) else { continue };
         let (low, high) = (a.min(b).min(c) - most, a.max(b).max(c) + most);
         tree.overlapping([low, high, high], |other, triangle| {
+            if component[face as usize] == component[other as usize] || !is_body(other) {
+                return ControlFlow::Continue(());
+            }
             let across = normal(triangle);
             let contact = || Contact::new(up, a, most);
-            let is_found = component[face as usize] != component[other as usize]
-                && across.length_squared() <= own.length_squared()
+            let is_found = across.length_squared() <= own.length_squared()
                 && across.normalize_or_zero().dot(up) < OPPOSED
                 && contact().holds(triangle)
                 && triangle.iter().any(|&p| !orient3d(a, b, c, p).is_zero());
@@ -62,6 +71,9 @@ pub(super) fn contacts(mesh: &TriMesh, most: f64) -> Vec<Contact> {
                 ControlFlow::Break(())
             }
         });
+        if found.len() == MOST_PLANES {
+            return Vec::new();
+        }
     }
     found
 }
