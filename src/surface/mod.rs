@@ -229,9 +229,14 @@ fn inspected(mut soup: soup::PolygonSoup) -> Result<Inspection, Fault> {
     {
         inspection.resolved = solid::resolve(&soup, unit, &inspection).map(Box::new);
         if inspection.resolved.is_none() && inspection.refused.is_none() {
-            let why = "the intersections were not resolved, so that results may be wrong; wrap the surface (`medial repair \
-                       --wrap`)";
-            inspection.report.warnings.push(why.to_owned());
+            let why = match inspection.report.self_intersecting {
+                true => "the intersections were not resolved, so that results may be wrong",
+                false => {
+                    "bodies nearer than 1e-6 of the diagonal were not joined, so that results may be wrong"
+                }
+            };
+            let why = format!("{why}; wrap the surface (`medial repair --wrap`)");
+            inspection.report.warnings.push(why);
         }
     }
     if let Some((spacing, diagonal)) = lost_digits(&inspection.mesh) {

@@ -124,11 +124,14 @@ fn resolved(
         }
         mesh = scaled;
     }
-    // A weld may have been all that was missing.
+    let replacement = |found: &Inspection| {
+        let by = found.mesh.faces.len();
+        is_joined.then_some(Repair::ResolvedFaces { faces: replaced, by })
+    };
+    // A weld or a join may have been all that was missing.
     let found = examined(&mesh)?;
     if is_solid(&found) {
-        let by = found.mesh.faces.len();
-        repairs.extend(is_joined.then_some(Repair::ResolvedFaces { faces: replaced, by }));
+        repairs.extend(replacement(&found));
         return Some(loaded(found, repairs));
     }
     let is_wall = |repair: &Repair| matches!(repair, Repair::DroppedDuplicateFaces { .. });
@@ -138,9 +141,7 @@ fn resolved(
         let separated = separate(&mut vertices, &mut faces);
         let found = examined(&TriMesh { vertices, faces })?;
         if is_solid(&found) {
-            let by = found.mesh.faces.len();
-            repairs.extend(is_joined.then_some(Repair::ResolvedFaces { faces: replaced, by }));
-            repairs.extend(separated);
+            repairs.extend(replacement(&found).into_iter().chain(separated));
             return Some(loaded(found, repairs));
         }
     }
