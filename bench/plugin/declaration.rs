@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use medial::simplifier::{Level, NativeLevel, ParamInfo};
+use medial::simplifier::{Capability, Level, MethodInfo, NativeLevel, ParamInfo};
 use medial::{parser_message, quoted};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
@@ -95,12 +95,8 @@ impl LevelKind {
 /// A plug-in that was checked.
 #[derive(Debug)]
 pub(super) struct Declaration {
-    pub id: String,
-    pub title: String,
-    pub citation: String,
+    pub info: MethodInfo,
     pub levels: Vec<LevelKind>,
-    pub native: Option<NativeLevel>,
-    pub params: Vec<ParamInfo>,
     pub fit: OutputUnits,
     /// The command as in the file, for the fingerprint.
     pub written: Vec<String>,
@@ -136,6 +132,11 @@ fn fault<T>(span: Range<usize>, message: impl Into<String>) -> Result<T, Fault> 
     Err((Some(span), message.into()))
 }
 
+/// Refuses a part of the file unless a condition holds.
+fn ensure(holds: bool, at: Range<usize>, message: impl Into<String>) -> Result<(), Fault> {
+    if holds { Ok(()) } else { fault(at, message) }
+}
+
 /// Reads and checks all plug-ins of a file. `folder` is where its relative paths start, `taken` the
 /// ids of other methods.
 pub(super) fn read(
@@ -168,13 +169,9 @@ fn read_document(text: &str, folder: &Path, taken: &[&str]) -> Result<Vec<Declar
     for written in document.method {
         let (id, at) = (written.id.get_ref().clone(), written.id.span());
         // A plug-in under the id of a published method would replace it in every table.
-        if taken.contains(&id.as_str()) {
-            return fault(at, taken_id(&id));
-        }
-        if !ids.insert(id.clone()) {
-            let message = format!("a method above has the id `{id}` too; change one of them");
-            return fault(at, message);
-        }
+        ensure(!taken.contains(&id.as_str()), at.clone(), taken_id(&id))?;
+        let twice = format!("a method above has the id `{id}` too; change one of them");
+        ensure(ids.insert(id), at, twice)?;
         declarations.push(written.check(folder)?);
     }
     Ok(declarations)
@@ -202,9 +199,7 @@ pub(crate) fn is_id(text: &str) -> bool {
 impl Written {
     fn check(self, folder: &Path) -> Result<Declaration, Fault> {
         let id = self.id.get_ref();
-        if !is_id(id) {
-            return fault(self.id.span(), wrong_id(id));
-        }
+        ensure(is_id(id), self.id.span(), wrong_id(id))?;
         let params = check_params(&self.params)?;
         let mut words = self.command.get_ref().iter();
         let Some(program) = words.next().filter(|program| !program.get_ref().is_empty()) else {
@@ -237,20 +232,28 @@ impl Written {
         self.check_passed(&arguments)?;
         for file in &self.files {
             let path = folder.join(file.get_ref());
-            if !path.is_file() {
-                let message = format!("{}: not a regular file; correct `files`", path.display());
-                return fault(file.span(), message);
-            }
+            let message = format!("{}: not a regular file; correct `files`", path.display());
+            ensure(path.is_file(), file.span(), message)?;
+        }
+        let levels = self.levels.into_inner();
+        let written = self.command.into_inner().into_iter().map(Spanned::into_inner);
+        let written: Vec<String> = written.collect();
+        let mut info = MethodInfo::new(self.id.into_inner(), self.title)
+            .citation(self.citation)
+            .summary(format!("An external program: {}.", written.join(" ")))
+            .params(params)
+            .extra(Capability::new("own_seconds", "seconds that the program measured by itself"))
+            .extra(Capability::new("program_peak", "most resident bytes of the program"));
+        info.native = self.native;
+        info.seeded = written.iter().any(|word| word.contains("{seed}"));
+        if levels.contains(&LevelKind::Published) {
+            info = info.published("what the program does without a level");
         }
         Ok(Declaration {
-            id: self.id.into_inner(),
-            title: self.title,
-            citation: self.citation,
-            levels: self.levels.into_inner(),
-            native: self.native,
-            params,
+            info,
+            levels,
             fit: self.fit,
-            written: self.command.into_inner().into_iter().map(Spanned::into_inner).collect(),
+            written,
             program,
             arguments,
             folder: folder.to_owned(),
@@ -262,45 +265,34 @@ impl Written {
     fn check_passed(&self, arguments: &[Word]) -> Result<(), Fault> {
         let passes =
             |name: &str| arguments.iter().any(|word| word.placeholders().any(|p| p == name));
-        if !passes("output") {
-            let message = "no argument has {output}; pass the program the name of its output file";
-            return fault(self.command.span(), message);
-        }
-        if let Some(param) = self.params.iter().find(|param| !passes(&param.get_ref().name)) {
+        let message = "no argument has {output}; pass the program the name of its output file";
+        ensure(passes("output"), self.command.span(), message)?;
+        for param in &self.params {
             let name = &param.get_ref().name;
             let message = format!(
                 "no argument has {{{name}}}; pass the parameter to the program, or remove it"
             );
-            return fault(param.span(), message);
+            ensure(passes(name), param.span(), message)?;
         }
         let (levels, at) = (self.levels.get_ref(), self.levels.span());
-        if levels.is_empty() {
-            let message =
-                r#"no level is declared; write levels = ["spheres"], "native" or "published""#;
-            return fault(at, message);
-        }
-        if levels.contains(&LevelKind::Native) && self.native.is_none() {
-            let message =
-                r#"levels has "native"; describe it: native = { name, unit, larger_is_coarser }"#;
-            return fault(at, message);
-        }
+        let message =
+            r#"no level is declared; write levels = ["spheres"], "native" or "published""#;
+        ensure(!levels.is_empty(), at.clone(), message)?;
+        let is_described = self.native.is_some() || !levels.contains(&LevelKind::Native);
+        let message =
+            r#"levels has "native"; describe it: native = { name, unit, larger_is_coarser }"#;
+        ensure(is_described, at.clone(), message)?;
         for kind in [LevelKind::Spheres, LevelKind::Native] {
             let name = kind.name();
-            match (levels.contains(&kind), passes(&name)) {
-                (true, false) => {
-                    let message = format!(
-                        "levels has {name:?}, but no argument has {{{name}}}; pass the level to the program"
-                    );
-                    return fault(at, message);
-                }
-                (false, true) => {
-                    let message = format!(
-                        "an argument has {{{name}}}, but levels has no {name:?}; declare or remove it"
-                    );
-                    return fault(self.command.span(), message);
-                }
-                _ => {}
-            }
+            let (is_declared, is_passed) = (levels.contains(&kind), passes(&name));
+            let message = format!(
+                "levels has {name:?}, but no argument has {{{name}}}; pass the level to the program"
+            );
+            ensure(is_passed || !is_declared, at.clone(), message)?;
+            let message = format!(
+                "an argument has {{{name}}}, but levels has no {name:?}; declare or remove it"
+            );
+            ensure(is_declared || !is_passed, self.command.span(), message)?;
         }
         Ok(())
     }

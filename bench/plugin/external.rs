@@ -2,17 +2,16 @@
 //! standard error.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
 use std::sync::Arc;
+use std::{fs, io};
 
 use medial::complex::{self, MedialMesh, Radii, ReadOptions};
 use medial::shape::Shape;
 use medial::simplifier::{
-    Capability, Level, MedialSimplifier, MethodInfo, Params, RunContext, Simplification,
-    Simplified, SimplifyError,
+    Level, MedialSimplifier, MethodInfo, Params, RunContext, Simplification, Simplified,
+    SimplifyError,
 };
 use medial::surface::{self, TriMesh};
 use medial_run::axis::reach;
@@ -38,7 +37,6 @@ pub const SCRATCH: &str = "MEDIAL_SCRATCH";
 /// A program can report the parts as [`OwnSeconds`].
 #[derive(Debug)]
 pub struct External {
-    info: MethodInfo,
     declaration: Arc<Declaration>,
     fingerprint: String,
 }
@@ -46,18 +44,7 @@ pub struct External {
 impl External {
     pub(super) fn new(declaration: Declaration) -> io::Result<Self> {
         let fingerprint = fingerprint(&declaration)?;
-        let mut info = MethodInfo::new(declaration.id.clone(), declaration.title.clone())
-            .citation(declaration.citation.clone())
-            .summary(format!("An external program: {}.", declaration.written.join(" ")))
-            .params(declaration.params.clone())
-            .extra(Capability::new("own_seconds", "seconds that the program measured by itself"))
-            .extra(Capability::new("program_peak", "most resident bytes of the program"));
-        info.native.clone_from(&declaration.native);
-        info.seeded = declaration.written.iter().any(|word| word.contains("{seed}"));
-        if declaration.levels.contains(&LevelKind::Published) {
-            info = info.published("what the program does without a level");
-        }
-        Ok(Self { info, declaration: Arc::new(declaration), fingerprint })
+        Ok(Self { declaration: Arc::new(declaration), fingerprint })
     }
 
     /// SHA-256 over the declaration and its files: an edited script is a new version.
@@ -68,7 +55,7 @@ impl External {
     /// A warning about files that the command names inside of a word, such as `--in=in.ma` or a script in a shell
     /// command, and that the fingerprint does not cover.
     pub fn remark(&self) -> Option<String> {
-        let Declaration { id, folder, arguments, .. } = &*self.declaration;
+        let Declaration { info, folder, arguments, .. } = &*self.declaration;
         let covered: Vec<_> = files(&self.declaration).flat_map(fs::canonicalize).collect();
         let is_end = |c: char| c.is_whitespace() || "=,;:'\"()<>|&".contains(c);
         let texts: Vec<String> = arguments.iter().map(|word| word.fill(|_| " ".into())).collect();
@@ -78,7 +65,7 @@ impl External {
             path.is_ok_and(|path| path.is_file() && !covered.contains(&path))
         });
         (!names.is_empty()).then(|| {
-            let names = names.join(", ");
+            let (id, names) = (&info.id, names.join(", "));
             format!("plug-in {id}: edits of {names} go unnoticed; list them in `files = [...]`")
         })
     }
@@ -87,7 +74,7 @@ impl External {
     ///
     /// The default decides the type: a number, `true` or `false`, or any text.
     fn values(&self, params: &Params) -> Result<Vec<(String, String)>, SimplifyError> {
-        let declared = &self.declaration.params;
+        let declared = &self.declaration.info.params;
         if let Some(key) = params.0.keys().find(|key| !declared.iter().any(|p| p.name == **key)) {
             let names: Vec<&str> = declared.iter().map(|param| &*param.name).collect();
             let known = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
@@ -115,7 +102,7 @@ impl External {
 
 impl MedialSimplifier for External {
     fn info(&self) -> &MethodInfo {
-        &self.info
+        &self.declaration.info
     }
 
     fn prepare<'s>(
@@ -175,17 +162,18 @@ impl Simplification for PreparedProgram<'_> {
         let ended = program::run(self.command(level, &output), &self.run)
             .map_err(|error| cannot(&format!("run {}", self.declaration.program.display()), error));
         let ended = ended?.ok_or(SimplifyError::Cancelled)?;
-        check_status(&self.declaration.id, ended.status, &ended.stderr)?;
+        check_status(&self.declaration.info.id, ended.status, &ended.stderr)?;
         self.result(level, &output, &ended)
     }
 }
 
 impl PreparedProgram<'_> {
     fn check(&self, level: Level) -> Result<(), SimplifyError> {
-        let Declaration { id, levels, .. } = &*self.declaration;
+        let Declaration { info, levels, .. } = &*self.declaration;
         if !levels.contains(&LevelKind::of(level)) {
             let options: Vec<&str> = levels.iter().map(|kind| kind.words()[1]).collect();
             let (kind, options) = (LevelKind::of(level).words()[0], options.join(" or "));
+            let id = &info.id;
             return Err(SimplifyError::unsupported(format!("{id} has no {kind}; give {options}")));
         }
         match level {
@@ -330,7 +318,8 @@ fn files(declaration: &Declaration) -> impl Iterator<Item = PathBuf> {
 
 /// SHA-256 of a declaration and of its files.
 fn fingerprint(declaration: &Declaration) -> io::Result<String> {
-    let Declaration { id, title, citation, levels, native, params, written, fit, .. } = declaration;
+    let Declaration { info, levels, written, fit, .. } = declaration;
+    let MethodInfo { id, title, citation, native, params, .. } = info;
     let declared = json!([id, title, citation, levels, native, params, written, fit]);
     let mut hasher = Sha256::new();
     hasher.update(declared.to_string());
