@@ -6,7 +6,7 @@
 use std::hint::black_box;
 use std::time::Duration;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use medial::Vec3;
 use medial::complex::{MedialMesh, MedialUnion, UnionAxis, betti};
 use medial::geometry::delaunay::Delaunay;
@@ -47,31 +47,35 @@ fn lattice(n: u32, step: f64) -> Vec<Vec3> {
         .collect()
 }
 
-fn predicates(c: &mut Criterion) {
-    let mut group = c.benchmark_group("predicates");
-    let corner = |i: u32| Vec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2));
-    let sphere = directions(8);
-    let sets: [(&str, Vec<Vec3>); 3] = [
-        ("easy", cube(8)),
-        ("lattice", (0..8).map(|i| corner(i) / 10.0).collect()),
-        ("cospherical", sphere),
-    ];
-    for (name, p) in &sets {
-        group.bench_function(BenchmarkId::new("in_sphere", name), |b| {
-            b.iter(|| in_sphere(p[0], p[1], p[2], p[4], black_box(p[7])));
-        });
-        group.bench_function(BenchmarkId::new("orient3d", name), |b| {
-            b.iter(|| orient3d(p[0], p[1], p[2], black_box(p[3])));
-        });
-        group.bench_function(BenchmarkId::new("circumsphere", name), |b| {
-            b.iter(|| circumsphere([p[0], p[1], p[2], black_box(p[4])]));
-        });
-    }
+/// Times some work on a number of elements, as `GROUP/NAME`.
+fn time<T>(
+    c: &mut Criterion,
+    group: &str,
+    name: impl ToString,
+    elements: usize,
+    mut work: impl FnMut() -> T,
+) {
+    let mut group = c.benchmark_group(group);
+    group.throughput(Throughput::Elements(elements as u64));
+    group.bench_function(name.to_string(), |b| b.iter(&mut work));
     group.finish();
 }
 
+fn predicates(c: &mut Criterion) {
+    let corner = |i: u32| Vec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2));
+    let sets: [(&str, Vec<Vec3>); 3] = [
+        ("easy", cube(8)),
+        ("lattice", (0..8).map(|i| corner(i) / 10.0).collect()),
+        ("cospherical", directions(8)),
+    ];
+    for (name, p) in &sets {
+        time(c, "in_sphere", name, 1, || in_sphere(p[0], p[1], p[2], p[4], black_box(p[7])));
+        time(c, "orient3d", name, 1, || orient3d(p[0], p[1], p[2], black_box(p[3])));
+        time(c, "circumsphere", name, 1, || circumsphere([p[0], p[1], p[2], black_box(p[4])]));
+    }
+}
+
 fn triangulations(c: &mut Criterion) {
-    let mut group = c.benchmark_group("delaunay");
     let sets = [
         ("cube", cube(20_000)),
         ("surface", surface(20_000)),
@@ -80,19 +84,14 @@ fn triangulations(c: &mut Criterion) {
         ("lattice in steps of 0.01", lattice(20, 0.01)),
     ];
     for (name, points) in &sets {
-        group.throughput(Throughput::Elements(points.len() as u64));
-        group.bench_function(*name, |b| b.iter(|| Delaunay::new(points).map(|d| d.cell_count())));
+        let count = || Delaunay::new(points).map(|d| d.cell_count());
+        time(c, "delaunay", name, points.len(), count);
     }
-    group.finish();
-    let mut group = c.benchmark_group("regular");
     let points = cube(20_000);
     let mut rng = Pcg64::seed_from_u64(3);
     let weights: Vec<f64> = points.iter().map(|_| 1e-3 * rng.random::<f64>()).collect();
-    group.throughput(Throughput::Elements(points.len() as u64));
-    group.bench_function("cube", |b| {
-        b.iter(|| Regular::new(&points, &weights).map(|r| r.cell_count()));
-    });
-    group.finish();
+    let count = || Regular::new(&points, &weights).map(|r| r.cell_count());
+    time(c, "regular", "cube", points.len(), count);
 }
 
 /// The union of balls: its dual complex, the vertices of its boundary, and the poles of samples,
@@ -100,10 +99,7 @@ fn triangulations(c: &mut Criterion) {
 fn unions(c: &mut Criterion) {
     let samples = surface(20_000);
     let delaunay = Delaunay::new(&samples).expect("spans space");
-    let mut group = c.benchmark_group("poles");
-    group.throughput(Throughput::Elements(samples.len() as u64));
-    group.bench_function("surface", |b| b.iter(|| Poles::new(&delaunay).balls().len()));
-    group.finish();
+    time(c, "poles", "surface", samples.len(), || Poles::new(&delaunay).balls().len());
     let poles = Poles::new(&delaunay);
     let inner = poles.inner_balls(|cell| {
         delaunay.circumsphere(cell).is_some_and(|(centre, _)| centre.length() < 0.7)
@@ -112,14 +108,15 @@ fn unions(c: &mut Criterion) {
     let mut rng = Pcg64::seed_from_u64(4);
     let random: Vec<_> =
         points.iter().map(|&p| Sphere::new(p, 0.04 * rng.random::<f64>())).collect();
+    let grown = |times: f64| {
+        let grow = move |s: Sphere| Sphere::new(s.centre, times * s.radius);
+        inner.iter().map(|ball| grow(ball.sphere)).collect()
+    };
     let grid = lattice(27, 1.0);
     let sets: [(&str, Vec<Sphere>); 4] = [
         ("cube", random),
-        ("inner poles", inner.iter().map(|b| b.sphere).collect()),
-        (
-            "inner poles grown by 1.1",
-            inner.iter().map(|b| Sphere::new(b.sphere.centre, 1.1 * b.sphere.radius)).collect(),
-        ),
+        ("inner poles", grown(1.0)),
+        ("inner poles grown by 1.1", grown(1.1)),
         ("lattice", grid.into_iter().map(|p| Sphere::new(p, 0.75)).collect()),
     ];
     for (name, balls) in &sets {
@@ -127,17 +124,13 @@ fn unions(c: &mut Criterion) {
         let weights: Vec<f64> = balls.iter().map(|b| b.radius * b.radius).collect();
         let regular = Regular::new(&points, &weights).expect("spans space");
         let complex = DualComplex::new(&regular);
-        for part in ["dual complex", "union boundary", "union axis"] {
-            let mut group = c.benchmark_group(part);
-            group.throughput(Throughput::Elements(balls.len() as u64));
-            group.bench_function(*name, |b| match part {
-                "dual complex" => b.iter(|| DualComplex::new(&regular).contains(CellId(0))),
-                // With both triangulations.
-                "union axis" => b.iter(|| UnionAxis::of_balls(balls).map(|a| a.edges().len())),
-                _ => b.iter(|| UnionBoundary::new(&complex).vertices().len()),
-            });
-            group.finish();
-        }
+        let dual = || DualComplex::new(&regular).contains(CellId(0));
+        time(c, "dual complex", name, balls.len(), dual);
+        let boundary = || UnionBoundary::new(&complex).vertices().len();
+        time(c, "union boundary", name, balls.len(), boundary);
+        // With both triangulations.
+        let axis = || UnionAxis::of_balls(balls).map(|a| a.edges().len());
+        time(c, "union axis", name, balls.len(), axis);
     }
 }
 
@@ -147,11 +140,10 @@ fn distances(c: &mut Criterion) {
     let tree = TriangleBvh::new(&ball).expect("the sphere has faces");
     let inside: Vec<Vec3> =
         directions(20_000).into_iter().zip(cube(20_000)).map(|(d, t)| d * t.x).collect();
-    let mut group = c.benchmark_group("closest_point");
-    group.throughput(Throughput::Elements(inside.len() as u64));
-    group.bench_function("batch", |b| b.iter(|| tree.closest_batch(black_box(&inside))));
-    group.bench_function("build", |b| b.iter(|| TriangleBvh::new(black_box(&ball))));
-    group.finish();
+    let batch = || tree.closest_batch(black_box(&inside));
+    time(c, "closest_point", "batch", inside.len(), batch);
+    let build = || TriangleBvh::new(black_box(&ball));
+    time(c, "closest_point", "build", inside.len(), build);
     // A ribbon through the points of a lattice.
     let spheres = lattice(8, 0.25).into_iter().map(|p| Sphere::new(p - Vec3::ONE, 0.15)).collect();
     let faces = (3..512).map(|k| [k - 3, k - 1, k]).collect();
@@ -161,22 +153,17 @@ fn distances(c: &mut Criterion) {
     let cloud = cube(5_000).into_iter().map(ball).collect();
     let cloud = MedialMesh { spheres: cloud, ..MedialMesh::default() };
     let points = surface(20_000);
-    let mut group = c.benchmark_group("union_distance");
-    group.throughput(Throughput::Elements(points.len() as u64));
     for (name, mesh) in [("sheet", sheet), ("coincident", cloud)] {
         let union = MedialUnion::new(&mesh).expect("it has spheres");
-        group.bench_function(BenchmarkId::new("signed", name), |b| {
-            b.iter(|| union.signed_batch(black_box(&points)));
-        });
-        group.bench_function(BenchmarkId::new("unsigned nearest", name), |b| {
-            b.iter(|| union.unsigned_nearest_batch(black_box(&points)));
-        });
+        let signed = || union.signed_batch(black_box(&points));
+        time(c, "union_distance signed", name, points.len(), signed);
+        let nearest = || union.unsigned_nearest_batch(black_box(&points));
+        time(c, "union_distance unsigned nearest", name, points.len(), nearest);
     }
-    group.finish();
 }
 
 /// Everything that the judge does, and its parts, on results of Q-MAT of three sizes.
-fn metrics(criterion: &mut Criterion) {
+fn metrics(c: &mut Criterion) {
     let source = Source::BuiltIn { id: "blob".into(), resolution: Some(40) };
     let input = Input::load(&source).expect("a built-in shape");
     let shape = input.shape(ShapeOptions::default()).expect("an extent");
@@ -188,18 +175,16 @@ fn metrics(criterion: &mut Criterion) {
     // As `medial compare` measures.
     let options = JudgeOptions { samples: 10_000, volume_depth: 5, ..JudgeOptions::default() };
     let judge = shape.judge(None, options).expect("the shape has faces");
-    let mut group = criterion.benchmark_group("metrics");
     for mesh in &meshes {
-        let name = |what| BenchmarkId::new(what, format!("{} spheres", mesh.spheres.len()));
-        group.bench_function(name("everything"), |b| b.iter(|| judge.evaluate(black_box(mesh))));
-        group.bench_function(name("distances"), |b| b.iter(|| judge.distances(black_box(mesh))));
-        group.bench_function(name("volume"), |b| b.iter(|| judge.volume_error(black_box(mesh))));
-        group.bench_function(name("topology"), |b| b.iter(|| betti(black_box(mesh))));
-        group.bench_function(name("quality and spikes"), |b| {
-            b.iter(|| (triangle_quality(black_box(mesh)), spikes(black_box(mesh))));
-        });
+        let count = mesh.spheres.len();
+        let name = format!("{count} spheres");
+        time(c, "metrics everything", &name, count, || judge.evaluate(black_box(mesh)));
+        time(c, "metrics distances", &name, count, || judge.distances(black_box(mesh)));
+        time(c, "metrics volume", &name, count, || judge.volume_error(black_box(mesh)));
+        time(c, "metrics topology", &name, count, || betti(black_box(mesh)));
+        let quality = || (triangle_quality(black_box(mesh)), spikes(black_box(mesh)));
+        time(c, "metrics quality and spikes", &name, count, quality);
     }
-    group.finish();
 }
 
 /// Two seconds for each benchmark, more for slow ones, which take the least number of samples.
