@@ -74,6 +74,6 @@ impl From<FileError> for Failure {
 impl From<InputError> for Failure {
     fn from(error: InputError) -> Self {
         // Names are words of the command line.
-        if error.is_name { Self::usage(error) } else { Self::input(error) }
+        if error.is_option { Self::usage(error) } else { Self::input(error) }
     }
 }

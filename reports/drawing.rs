@@ -1,6 +1,5 @@
 //! A picture of a surface and of medial meshes of it: the work of `render`, for the command and for Python.
 
-use std::fmt;
 use std::str::FromStr;
 
 use medial::Vec3;
@@ -8,7 +7,8 @@ use medial::complex::{MedialMesh, union_surface};
 use medial::metrics::JudgeOptions;
 use medial::shape::{Cost, Shape};
 use medial::surface::{SignedDistance, TriMesh};
-use medial_run::reconstruct::ReconstructError;
+use medial_run::error::InputError;
+use medial_run::reconstruct::contour_error;
 use medial_run::text::{counted, significant};
 use serde::{Deserialize, Serialize};
 
@@ -90,30 +90,18 @@ pub struct DrawnError {
 }
 
 /// The reason for which there is no picture.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{}{error}", axis.as_ref().map_or_else(String::new, |name| format!("{name}: ")))]
 pub struct DrawError {
     /// The medial mesh that it is about.
     pub axis: Option<String>,
-    /// Whether an option is wrong, rather than an input.
-    pub is_option: bool,
-    /// One line, which begins with the name of a wrong option.
-    pub message: String,
+    /// Its message begins with the name of a wrong option.
+    pub error: InputError,
 }
 
-impl DrawError {
-    fn option(message: impl ToString) -> Self {
-        Self { axis: None, is_option: true, message: message.to_string() }
-    }
-
-    fn input(message: impl ToString) -> Self {
-        Self { axis: None, is_option: false, message: message.to_string() }
-    }
-}
-
-impl fmt::Display for DrawError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let named = self.axis.iter().try_for_each(|name| write!(f, "{name}: "));
-        named.and_then(|()| f.write_str(&self.message))
+impl From<InputError> for DrawError {
+    fn from(error: InputError) -> Self {
+        Self { axis: None, error }
     }
 }
 
@@ -122,7 +110,7 @@ impl Drawing {
     ///
     /// # Errors
     /// For a content that requires another number of medial meshes.
-    pub fn content(&self, count: usize) -> Result<Show, DrawError> {
+    pub fn content(&self, count: usize) -> Result<Show, InputError> {
         let (show, problem) = match (self.show, count) {
             (None, 0) => return Ok(Show::Surface),
             (None, _) => return Ok(Show::Axis),
@@ -135,7 +123,7 @@ impl Drawing {
             (Some(show), _) => return Ok(show),
         };
         let word = serde_json::to_value(show).unwrap_or_default();
-        Err(DrawError::option(format!("show {}{problem}", word.as_str().unwrap_or_default())))
+        Err(InputError::option(format!("show {}{problem}", word.as_str().unwrap_or_default())))
     }
 
     /// A picture of a shape and of named medial meshes in its normalised units. `at` gets each stage.
@@ -152,7 +140,7 @@ impl Drawing {
         for (option, value) in fractions {
             if let Some(value) = value.filter(|&x| !(x > 0.0 && x <= 1.0)) {
                 let problem = format!("{option} {value}: expected a number above 0 and at most 1");
-                return Err(DrawError::option(problem));
+                return Err(InputError::option(problem).into());
             }
         }
         let show = self.content(axes.len())?;
@@ -166,13 +154,13 @@ impl Drawing {
         if matches!(show, Show::Error | Show::Reconstruction) {
             // As in `evaluate` by default: the drawn vertices are fewer and would give another number.
             let judge = (show == Show::Error).then(|| shape.judge(None, JudgeOptions::default()));
-            let judge = judge.transpose().map_err(DrawError::input)?;
+            let judge = judge.transpose().map_err(InputError::input)?;
             for (name, axis) in axes {
                 let mut made = Deviation::new(shape, name, axis, self.tolerance)?;
                 let measured = judge.as_ref().map(|judge| judge.distances(axis)).transpose();
                 let measured = measured.map_err(|error| DrawError {
                     axis: Some(name.clone()),
-                    ..DrawError::input(error)
+                    error: InputError::input(error),
                 });
                 made.hausdorff = measured?.map(|distances| distances.hausdorff);
                 deviations.push(made);
@@ -185,11 +173,11 @@ impl Drawing {
             0 | 1 => scene.single(deviations.first()),
             _ => scene.side_by_side(&deviations),
         });
-        let picture = picture.map_err(DrawError::option)?;
+        let picture = picture.map_err(InputError::option)?;
         let errors = deviations.iter().map(Deviation::figures).collect();
         let Picture { width, height, .. } = picture;
         let Camera { direction, up, .. } = camera;
-        let png = picture.to_png().map_err(DrawError::input)?;
+        let png = picture.to_png().map_err(InputError::input)?;
         Ok(Drawn { png, width, height, direction, up, errors, seconds: cost.seconds })
     }
 
@@ -291,13 +279,12 @@ impl Deviation {
         axis: &MedialMesh,
         tolerance: f64,
     ) -> Result<Self, DrawError> {
-        let made = union_surface(axis, tolerance).map_err(|error| {
-            let ReconstructError { is_tolerance, message } =
-                ReconstructError::of_contour(error, 1.0, TOLERANCE);
-            DrawError { axis: Some(name.to_owned()), is_option: is_tolerance, message }
+        let made = union_surface(axis, tolerance).map_err(|error| DrawError {
+            axis: Some(name.to_owned()),
+            error: contour_error(error, 1.0, TOLERANCE),
         });
         let mesh = made?.mesh;
-        let tree = shape.surface_tree().map_err(DrawError::input)?;
+        let tree = shape.surface_tree().map_err(InputError::input)?;
         let inside = shape.inside_test();
         let values = SignedDistance::closed(&tree, &inside).batch(&mesh.vertices);
         Ok(Self { mesh, values, hausdorff: None })

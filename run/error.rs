@@ -14,25 +14,31 @@ pub struct FileError(pub String);
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
 pub struct InputError {
-    /// Whether its name is wrong, rather than its file.
-    pub is_name: bool,
+    /// Whether its name or an option is wrong, rather than its content.
+    pub is_option: bool,
     /// One line.
     pub message: String,
 }
 
 impl InputError {
-    pub(crate) fn name(message: impl ToString) -> Self {
-        Self { is_name: true, message: message.to_string() }
+    /// A name or an option is wrong.
+    pub fn option(message: impl ToString) -> Self {
+        Self { is_option: true, message: message.to_string() }
+    }
+
+    /// The content is wrong.
+    pub fn input(message: impl ToString) -> Self {
+        Self { is_option: false, message: message.to_string() }
     }
 
     pub(crate) fn file(path: &Path, problem: impl Display) -> Self {
-        Self { is_name: false, message: FileError::at(path, problem).0 }
+        Self::input(FileError::at(path, problem))
     }
 }
 
 impl From<SurfaceError> for InputError {
     fn from(error: SurfaceError) -> Self {
-        Self { is_name: false, message: error.to_string() }
+        Self::input(error)
     }
 }
 

@@ -5,8 +5,7 @@ use std::{fmt, fs, io};
 
 use medial::complex::MedialMesh;
 use medial::shape::{Shape, ShapeError, ShapeOptions};
-use medial::surface;
-use medial::surface::{SurfaceReport, TriMesh};
+use medial::surface::{self, SurfaceReport, TriMesh};
 use medial_datasets::BuiltIn;
 use serde::{Deserialize, Serialize};
 
@@ -70,7 +69,9 @@ impl Source {
             Some((id, text)) => {
                 // Anything behind the second colon: a typing error must not become the default.
                 let resolution = text.parse().map_err(|_| {
-                    InputError::name(format!("wrong resolution `{text}`; write builtin:ID:NUMBER"))
+                    InputError::option(format!(
+                        "wrong resolution `{text}`; write builtin:ID:NUMBER"
+                    ))
                 })?;
                 (id, Some(resolution))
             }
@@ -254,7 +255,7 @@ fn built_in(
     let shape = medial_datasets::find(id).ok_or_else(|| {
         let ids = medial_datasets::catalogue().into_iter().map(|shape| shape.id);
         let meant = did_you_mean(id, ids.collect::<Vec<_>>());
-        InputError::name(format!(
+        InputError::option(format!(
             "unknown built-in shape `{id}`{meant}; list all names by `medial datasets list`"
         ))
     })?;
@@ -262,14 +263,14 @@ fn built_in(
     let range = shape.resolutions();
     if !range.contains(&resolution) {
         let (least, most) = (range.start(), range.end());
-        return Err(InputError::name(format!(
+        return Err(InputError::option(format!(
             "builtin:{id}: wrong resolution (found {resolution}, expected {least} to {most})"
         )));
     }
     // Estimated, because generating the mesh would take too long.
     let vertices = estimated_vertices(&shape, resolution);
     if vertices > MAX_VERTICES {
-        return Err(InputError::name(format!(
+        return Err(InputError::option(format!(
             "builtin:{id}: resolution {resolution} is too fine (about {vertices:.1e} vertices, at most \
              {MAX_VERTICES:.0e})"
         )));

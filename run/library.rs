@@ -73,7 +73,7 @@ impl Library {
             None => etcetera::choose_base_strategy()
                 .map(|folders| folders.cache_dir().join("medial"))
                 .map_err(|_| {
-                    InputError::name("no cache folder found; set MEDIAL_CACHE to a folder")
+                    InputError::option("no cache folder found; set MEDIAL_CACHE to a folder")
                 })?,
         };
         // Workers and clients have other working folders.
@@ -163,7 +163,7 @@ impl Library {
             names.truncate(MOST_NAMES);
             names.push(format!("{more} more"));
         }
-        Err(InputError::name(format!("{word}: not fetched ({}); {how}", names.join(", "))))
+        Err(InputError::option(format!("{word}: not fetched ({}); {how}", names.join(", "))))
     }
 
     /// The mesh with a name.
@@ -184,7 +184,7 @@ impl Library {
         let packages = self.catalogue.packages.iter().map(|package| package.id.as_str());
         let sets = Set::ALL.map(Set::key).into_iter().chain(["builtin"]);
         let meant = did_you_mean(word, sets.chain(packages).chain(meshes));
-        InputError::name(format!(
+        InputError::option(format!(
             "unknown set, package or mesh `{word}`{meant}; list all names by `medial datasets list`"
         ))
     }

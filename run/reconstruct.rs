@@ -10,6 +10,7 @@ use medial::shape::{Shape, ShapeError};
 use medial::surface::{self, Normalisation, SurfaceReport, TriMesh};
 use serde::Serialize;
 
+use crate::error::InputError;
 use crate::text::{counted, significant};
 
 /// A reconstructed surface in input units, with its diagnostics.
@@ -60,44 +61,26 @@ pub enum Figures {
     },
 }
 
-/// The reason for which there is no surface.
-#[derive(Debug, thiserror::Error)]
-#[error("{message}")]
-pub struct ReconstructError {
-    /// Whether the tolerance is wrong, rather than the input.
-    pub is_tolerance: bool,
-    /// One line.
-    pub message: String,
-}
-
-impl ReconstructError {
-    fn input(error: impl ToString) -> Self {
-        Self { is_tolerance: false, message: error.to_string() }
-    }
-
-    /// An error of the contour, with tolerances as fractions of the diagonal. A feasible tolerance can be much larger
-    /// than necessary, so `usual` comes first.
-    pub fn of_contour(error: ContourError, diagonal: f64, usual: f64) -> Self {
-        let message = match error {
-            ContourError::TooFine { tolerance, most, feasible } => {
-                let [tolerance, feasible] = [tolerance, feasible].map(|length| length / diagonal);
-                let advised = feasible.min(if tolerance < usual { usual } else { 1.0 });
-                let advice = match advised > tolerance && feasible < HOPELESS {
-                    true => format!("give a tolerance of {advised:.1e}"),
-                    false => "no tolerance works; check the units of the medial mesh".to_owned(),
-                };
-                let tolerance = significant(tolerance, 4);
-                format!("tolerance {tolerance} is too fine (more than {most} tetrahedra); {advice}")
-            }
-            ContourError::TooThin { feasible, .. } => format!(
-                "every sphere is too thin for this tolerance; give a tolerance of {:.1e} for the largest, or larger \
-                 radii",
-                feasible / diagonal
-            ),
-            other => return Self::input(other),
-        };
-        Self { is_tolerance: true, message }
-    }
+/// An error of the contour, with tolerances as fractions of the diagonal. A feasible tolerance can be much larger than
+/// necessary, so `usual` comes first.
+pub fn contour_error(error: ContourError, diagonal: f64, usual: f64) -> InputError {
+    InputError::option(match error {
+        ContourError::TooFine { tolerance, most, feasible } => {
+            let [tolerance, feasible] = [tolerance, feasible].map(|length| length / diagonal);
+            let advised = feasible.min(if tolerance < usual { usual } else { 1.0 });
+            let advice = match advised > tolerance && feasible < HOPELESS {
+                true => format!("give a tolerance of {advised:.1e}"),
+                false => "no tolerance works; check the units of the medial mesh".to_owned(),
+            };
+            let tolerance = significant(tolerance, 4);
+            format!("tolerance {tolerance} is too fine (more than {most} tetrahedra); {advice}")
+        }
+        ContourError::TooThin { feasible, .. } => format!(
+            "every sphere is too thin for this tolerance; give a tolerance of {:.1e} for the largest, or larger radii",
+            feasible / diagonal
+        ),
+        other => return InputError::input(other),
+    })
 }
 
 /// Tolerances are at most 1. Feasible ones can be larger than the least that works by this factor.
@@ -110,23 +93,20 @@ const COINCIDENT: f64 = 1e-6;
 ///
 /// # Errors
 /// When the surface has no poles, or no inner ball has a cell.
-pub fn power_crust(
-    shape: &Shape,
-    axis: Option<&MedialMesh>,
-) -> Result<Reconstruction, ReconstructError> {
-    let balls = shape.polar_balls().map_err(ReconstructError::input)?;
+pub fn power_crust(shape: &Shape, axis: Option<&MedialMesh>) -> Result<Reconstruction, InputError> {
+    let balls = shape.polar_balls().map_err(InputError::input)?;
     let units = shape.normalisation();
     let inner = match axis {
         Some(axis) => axis.to_normal(units).spheres,
         None => balls.inner,
     };
-    let crust = PowerCrust::new(&inner, &balls.outer).map_err(ReconstructError::input)?;
+    let crust = PowerCrust::new(&inner, &balls.outer).map_err(InputError::input)?;
     let facets = crust.facet_count();
     let mut crust = surface::crust_surface(&crust, COINCIDENT);
     // A medial mesh in other units lies outside of all cells.
     if crust.mesh.faces.is_empty() {
         let why = "no inner ball has a power cell; check surface and units of the medial mesh";
-        return Err(ReconstructError::input(why));
+        return Err(InputError::input(why));
     }
     crust.mesh.vertices.iter_mut().for_each(|vertex| *vertex = units.backward(*vertex));
     let figures = Figures::PowerCrust {
@@ -152,19 +132,19 @@ pub fn union_boundary(
     axis: &MedialMesh,
     diagonal: Option<f64>,
     tolerance: Option<f64>,
-) -> Result<Reconstruction, ReconstructError> {
-    let union = MedialUnion::new(axis).map_err(ReconstructError::input)?;
+) -> Result<Reconstruction, InputError> {
+    let union = MedialUnion::new(axis).map_err(InputError::input)?;
     let (low, high) = union.bounding_box();
     let corners = TriMesh { vertices: vec![low, high], faces: vec![] };
     let diagonal = diagonal.or_else(|| Normalisation::of(&corners).map(|units| units.diagonal));
     let why = "the extent of the spheres is zero or not finite";
-    let diagonal = diagonal.ok_or_else(|| ReconstructError::input(why))?;
+    let diagonal = diagonal.ok_or_else(|| InputError::input(why))?;
     // Squares of tiny lengths would underflow.
     let unit = axis.unit();
     let (axis, diagonal) = (axis.transformed(1.0 / unit, |p| p / unit), diagonal / unit);
     let fitting = fitting_surface(&axis, diagonal, tolerance);
     let Fitting { mut made, tolerance, off, betti } =
-        fitting.map_err(|error| ReconstructError::of_contour(error, diagonal, FINE))?;
+        fitting.map_err(|error| contour_error(error, diagonal, FINE))?;
     let mut warnings = Vec::new();
     if made.lost > 0 {
         warnings.push(format!(

@@ -10,6 +10,7 @@ use medial_reports::drawing::{
     Background, ColourBy, DrawError, Drawing, Drawn, Show, TOLERANCE, Upward, View, hausdorff_text,
 };
 use medial_run::axis::read_axis;
+use medial_run::error::InputError;
 use serde_json::json;
 
 use crate::args::{AxisArguments, Global, MeshArgument, fraction, word};
@@ -99,7 +100,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     };
     let stem = |path: &PathBuf| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let failed = |error: DrawError| {
-        let DrawError { axis, is_option, message } = error;
+        let DrawError { axis, error: InputError { is_option, message } } = error;
         let code = if is_option { Exit::Usage } else { Exit::Input };
         // The file instead of the caption.
         let message = match arguments.axes.iter().find(|path| Some(stem(path)) == axis) {
@@ -109,7 +110,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         };
         Failure { code, message }
     };
-    drawing.content(arguments.axes.len()).map_err(failed)?;
+    drawing.content(arguments.axes.len()).map_err(|error| failed(error.into()))?;
     let line = global.stages();
     line.at("reading");
     let (_, shape) = shape_of(&arguments.mesh, ShapeOptions::default(), false)?;

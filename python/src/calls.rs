@@ -23,7 +23,6 @@ use medial::shape::ShapeError;
 use medial::simplifier::{Progress, RunContext, SimplifyError};
 use medial::surface::{BvhError, SurfaceError};
 use medial_run::error::InputError;
-use medial_run::reconstruct::ReconstructError;
 use medial_run::record::Status;
 use medial_run::timed::Fault;
 use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
@@ -282,7 +281,6 @@ about_input!(
     InputError,
     MaError,
     MetricError,
-    ReconstructError,
     ShapeError,
     SurfaceError,
     TriangulationError

@@ -80,7 +80,7 @@ pub fn render<'py>(
         let axes: Vec<_> = axes.into_iter().map(|(name, mesh)| (name, normal(&mesh))).collect();
         let drawn = drawing.draw(&shape, &axes, &|stage| monitor.at(stage));
         let drawn = drawn.map_err(|error: DrawError| {
-            let kind = if error.is_option { Kind::Parameter } else { Kind::Input };
+            let kind = if error.error.is_option { Kind::Parameter } else { Kind::Input };
             Failure::new(kind, error)
         })?;
         let object = json!({
