@@ -6,8 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use medial_reports::{read_header, reasons};
 use medial_run::input::Source;
-use medial_run::item::GIVEN;
-use medial_run::item::Item;
+use medial_run::item::{GIVEN, Item};
 use medial_run::record::{Record, Status};
 use serde_json::json;
 
@@ -23,7 +22,7 @@ use crate::store::{AXES, PAGE, RESULTS, Store};
 use crate::study::edition::{Edition, Mixed};
 use crate::study::external::ExternalResult;
 use crate::study::registry::Registry;
-use crate::study::{Study, StudyMethod, shard};
+use crate::study::{Study, StudyMethod, shard, unique_names};
 
 #[derive(Debug, Args)]
 pub struct Arguments {
@@ -126,7 +125,8 @@ pub fn run(
     if arguments.substrate.as_is {
         study.sources()?.iter().try_for_each(Source::check_as_is)?;
     }
-    study.external_remarks()?.iter().for_each(|remark| note(global, remark));
+    let (_, remarks) = study.external_files(&unique_names(&study.sources()?))?;
+    remarks.iter().for_each(|remark| note(global, remark));
     let edition = Edition::of(&study)?;
     edition.iter().try_for_each(|edition| edition.check(&study, &items))?;
     if let Some(text) = &arguments.shard {

@@ -6,12 +6,9 @@ use std::path::{Path, PathBuf};
 
 use jiff::tz::TimeZone;
 use medial_reports::{Header, MethodNote, RunNote, read_header, write_report, write_site};
-use medial_run::input::Source;
-use medial_run::item::GIVEN;
-use medial_run::item::Item;
+use medial_run::item::{GIVEN, Item};
 use medial_run::journal::read_records;
-use medial_run::record::Provenance;
-use medial_run::record::{Record, Status};
+use medial_run::record::{Provenance, Record, Status};
 use serde_json::json;
 
 use crate::exit::{Exit, Failure};
@@ -48,14 +45,6 @@ pub struct Rebuilt {
 /// Rebuilds the report of a store from its files, in its folder, or as a static site in another one while the store stays
 /// unchanged. Fails when the store has no readable record, or the report cannot be written.
 pub fn rebuild(dir: &Path, site: Option<&Path>, registry: &Registry) -> Result<Rebuilt, Failure> {
-    let (records, warnings) = some_records(dir)?;
-    let header = header(dir, &records, registry, &warnings);
-    let items = items_of(dir, registry);
-    write([dir, site.unwrap_or(dir)], (records, warnings), (&items, registry), header)
-}
-
-/// The records of a store, at least one, and warnings about lines without a record.
-fn some_records(dir: &Path) -> Result<(Vec<Record>, Vec<String>), Failure> {
     let (records, warnings) = records(dir)?;
     if records.is_empty() {
         let message = match warnings.first() {
@@ -64,21 +53,11 @@ fn some_records(dir: &Path) -> Result<(Vec<Record>, Vec<String>), Failure> {
         };
         return Err(Failure { code: Exit::NothingMeasured, message });
     }
-    Ok((records, warnings))
-}
-
-/// The items of the study of a store.
-fn items_of(dir: &Path, registry: &Registry) -> Vec<Item> {
+    let header = header(dir, &records, registry, &warnings);
     // If meshes or plug-ins of the study are missing, the records stay in their order.
-    Study::read(&dir.join(STUDY))
-        .and_then(|study| study.items(registry, &provenance()))
-        .unwrap_or_default()
-}
-
-/// The sources of the study of a store; none where they cannot be read.
-fn sources(dir: &Path) -> Vec<Source> {
-    let study = Study::read(&dir.join(STUDY)).ok();
-    study.and_then(|study| study.sources().ok()).unwrap_or_default()
+    let items = Study::read(&dir.join(STUDY)).and_then(|it| it.items(registry, &provenance()));
+    let items = items.unwrap_or_default();
+    write([dir, site.unwrap_or(dir)], (records, warnings), (&items, registry), header)
 }
 
 /// Writes the report of a run of `compare`, whose items give the order of the tables. A page that is there is that of all
@@ -115,8 +94,8 @@ fn write(
     let order = positions(items);
     records.sort_by_key(|record| order.get(&row_of(record)).copied().unwrap_or(usize::MAX));
     let study = Study::read(&dir.join(STUDY)).ok();
-    let mixed = study.and_then(|study| match Edition::of(&study) {
-        Ok(edition) => Some(edition?.beside(&study, &records, registry)),
+    let mixed = study.as_ref().and_then(|study| match Edition::of(study) {
+        Ok(edition) => Some(edition?.beside(study, &records, registry)),
         // The own results do not depend on it.
         Err(error) => {
             header.notes.push(error.message);
@@ -126,7 +105,8 @@ fn write(
     header.notes.extend(mixed.iter().flat_map(|mixed| mixed.notes.clone()));
     let shown = mixed.map_or_else(|| records.clone(), |mixed| mixed.records);
     // Pictures of inputs that can no longer be read stay unchanged.
-    let undrawn = pictures::draw([dir, to], &shown, &sources(dir));
+    let sources = study.and_then(|study| study.sources().ok()).unwrap_or_default();
+    let undrawn = pictures::draw([dir, to], &shown, &sources);
     let files = match dir == to {
         true => write_report(dir, &shown, &header)?,
         false => write_site(to, dir, &shown, &header)?,
@@ -176,19 +156,12 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
         is_site: false,
     };
     for record in records {
-        if !header
-            .runs
-            .iter()
-            .any(|known| known.command == record.command && known.binary_hash == record.binary_hash)
-        {
-            // Records can come from other machines and from runs that were interrupted before their report.
-            header.runs.push(RunNote {
-                command: record.command.clone(),
-                version: record.version.clone(),
-                binary_hash: record.binary_hash.clone(),
-                date: None,
-                machine: Some(record.machine.clone()),
-            });
+        let Record { command, version, binary_hash, machine, .. } = record.clone();
+        let run = RunNote { command, version, binary_hash, date: None, machine: Some(machine) };
+        let is_run = |r: &RunNote| (&r.command, &r.binary_hash) == (&run.command, &run.binary_hash);
+        // Records can come from other machines and from runs that were interrupted before their report.
+        if !header.runs.iter().any(is_run) {
+            header.runs.push(run);
         }
     }
     // Methods of this program get their present descriptions, also those that only an edition has run.
@@ -232,18 +205,11 @@ fn external_note(record: &Record) -> MethodNote {
             summary += &format!(" {words}: {text}.");
         }
     }
-    let name = record.simplify.variant.clone().unwrap_or_default();
+    let id = record.simplify.variant.clone().unwrap_or_default();
     let title = match claim("title") {
         "" => "a file of another program".to_owned(),
         title => title.to_owned(),
     };
-    let bibtex = claim("bibtex").to_owned();
-    MethodNote {
-        id: name,
-        title,
-        citation: citation.join(". "),
-        bibtex,
-        summary,
-        ..MethodNote::default()
-    }
+    let (citation, bibtex) = (citation.join(". "), claim("bibtex").to_owned());
+    MethodNote { id, title, citation, bibtex, summary, ..MethodNote::default() }
 }

@@ -14,8 +14,7 @@ use medial_run::journal::{RESULTS, read_records};
 use medial_run::level::Target;
 use medial_run::record::{Conditions, Record};
 use medial_run::settings::VOLUME_DEPTH;
-use medial_run::text::did_you_mean;
-use medial_run::text::significant;
+use medial_run::text::{did_you_mean, significant};
 use serde::Deserialize;
 use serde_json::json;
 

@@ -25,9 +25,10 @@ use medial_run::level::Target;
 use medial_run::record::{OwnSeconds, Provenance, is_near};
 use medial_run::scene::SceneSpec;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use crate::exit::Failure;
-use crate::study::{Study, parse_toml};
+use crate::study::{Study, parse_toml, unique_names};
 
 /// An external result with its name in tables.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -241,31 +242,22 @@ medial::parameters! {
         /// Origin of the radii.
         radii: RadiiFrom = RadiiFrom::File, "file or surface";
         /// Counts of the header may be wrong.
-        #[serde(skip_serializing_if = "std::ops::Not::not")]
         lenient: bool = false, "true or false";
         /// Number of the medial mesh in a file with several, from 1.
-        #[serde(skip_serializing_if = "Option::is_none")]
         block: Option<usize> = None, "number";
         /// Full name of the method, as claimed.
-        #[serde(skip_serializing_if = "String::is_empty")]
         title: String = String::new(), "text";
         /// Who computed the results, as claimed.
-        #[serde(skip_serializing_if = "String::is_empty")]
         authors: String = String::new(), "text";
         /// Source of the method, as claimed.
-        #[serde(skip_serializing_if = "String::is_empty")]
         citation: String = String::new(), "text";
         /// The source as BibTeX, as claimed.
-        #[serde(skip_serializing_if = "String::is_empty")]
         bibtex: String = String::new(), "text";
         /// How it was run, as claimed.
-        #[serde(skip_serializing_if = "String::is_empty")]
         run: String = String::new(), "text";
         /// The machine of the seconds, as claimed.
-        #[serde(skip_serializing_if = "String::is_empty")]
         machine: String = String::new(), "text";
         /// Seconds as claimed.
-        #[serde(skip_serializing_if = "Option::is_none")]
         claimed_seconds: Option<f64> = None, "seconds";
     }
 }
@@ -327,7 +319,8 @@ pub(crate) struct ExternalFile {
     pub mesh: String,
     /// Name of the method in tables.
     name: String,
-    params: ExternalParams,
+    /// Those of [`ExternalParams`] that are not the default.
+    params: Params,
     /// SHA-256 of its bytes.
     hash: String,
     /// Requested number of spheres, which the result has to within 2 %.
@@ -335,21 +328,36 @@ pub(crate) struct ExternalFile {
 }
 
 impl Study {
-    /// The external results with their meshes, among the names of all meshes.
+    /// The external results with their meshes, among the names of all meshes, and a remark on each folder of results with
+    /// files that are no results on these meshes.
     ///
     /// # Errors
     /// For a file that cannot be read or belongs to no mesh, and for two of one name.
-    pub(crate) fn external_files(&self, meshes: &[String]) -> Result<Vec<ExternalFile>, Failure> {
-        let mut files: Vec<ExternalFile> = Vec::new();
+    pub(crate) fn external_files(
+        &self,
+        meshes: &[String],
+    ) -> Result<(Vec<ExternalFile>, Vec<String>), Failure> {
+        /// Names that a remark lists.
+        const LISTED: usize = 10;
+        let (mut files, mut remarks): (Vec<ExternalFile>, _) = (Vec::new(), Vec::new());
         let mut all: Vec<(ExternalResult, Claims)> = Vec::new();
         for given in &self.given {
             let folder = self.resolved(&given.file);
-            if folder.is_dir() {
-                let Folder { files, claims, .. } =
-                    given.in_folder(&folder, meshes).map_err(|why| given.refused(why))?;
-                all.extend(files.into_iter().map(|given| (given, claims.clone())));
-            } else {
+            if !folder.is_dir() {
                 all.push((given.clone(), Claims::default()));
+                continue;
+            }
+            let Folder { files, claims, mut skipped } =
+                given.in_folder(&folder, meshes).map_err(|why| given.refused(why))?;
+            all.extend(files.into_iter().map(|given| (given, claims.clone())));
+            let more = if skipped.len() > LISTED { ", ..." } else { "" };
+            skipped.truncate(LISTED);
+            if !skipped.is_empty() {
+                remarks.push(format!(
+                    "{}: skipped files that are no result of a mesh of the study in a known format ({}{more})",
+                    folder.display(),
+                    skipped.join(", ")
+                ));
             }
         }
         // By name, mesh and count: several counts of one method are one curve.
@@ -368,36 +376,7 @@ impl Study {
             }
             files.push(file);
         }
-        Ok(files)
-    }
-
-    /// A remark on each folder of results with files that are no results on a mesh of the study.
-    ///
-    /// # Errors
-    /// When a folder is refused.
-    pub fn external_remarks(&self) -> Result<Vec<String>, Failure> {
-        /// Names that a remark lists.
-        const LISTED: usize = 10;
-        let mut remarks = Vec::new();
-        for given in &self.given {
-            let folder = self.resolved(&given.file);
-            if !folder.is_dir() {
-                continue;
-            }
-            let meshes = crate::study::unique_names(&self.sources()?);
-            let found = given.in_folder(&folder, &meshes).map_err(|why| given.refused(why))?;
-            let mut names = found.skipped;
-            let more = if names.len() > LISTED { ", ..." } else { "" };
-            names.truncate(LISTED);
-            if !names.is_empty() {
-                remarks.push(format!(
-                    "{}: skipped files that are no result of a mesh of the study in a known format ({}{more})",
-                    folder.display(),
-                    names.join(", ")
-                ));
-            }
-        }
-        Ok(remarks)
+        Ok((files, remarks))
     }
 
     fn read_result(
@@ -423,22 +402,13 @@ impl Study {
         // The count in the name, if it is as near as the results of methods must be.
         let named = stem.rsplit_once('-').and_then(|(_, count)| count.parse().ok());
         let spheres = named.filter(|&count| is_near(spheres, count)).unwrap_or(spheres);
-        let claimed_seconds = seconds.get(&*stem).copied();
-        let file = path.to_string_lossy().into_owned().into();
-        let params = ExternalParams {
-            file,
-            fit,
-            radii,
-            lenient,
-            block,
-            title,
-            authors,
-            citation,
-            bibtex,
-            run,
-            machine,
-            claimed_seconds,
-        };
+        let params = json!({
+            "file": path.to_string_lossy(), "fit": fit, "radii": radii, "lenient": lenient, "block": block,
+            "title": title, "authors": authors, "citation": citation, "bibtex": bibtex, "run": run,
+            "machine": machine, "claimed_seconds": seconds.get(&*stem),
+        });
+        let mut params: Params = serde_json::from_value(params).expect("an object");
+        params.0.retain(|_, value| ![json!(null), json!(false), json!("")].contains(value));
         Ok(ExternalFile { mesh, name: given.name, params, hash: hex_digest(&bytes), spheres })
     }
 
@@ -447,8 +417,7 @@ impl Study {
     /// # Errors
     /// For a file that cannot be read.
     pub fn external_counts(&self) -> Result<Vec<usize>, Failure> {
-        let sources = self.sources()?;
-        let files = self.external_files(&crate::study::unique_names(&sources))?;
+        let (files, _) = self.external_files(&unique_names(&self.sources()?))?;
         let mut counts: Vec<usize> = files.iter().map(|file| file.spheres).collect();
         counts.sort_unstable_by(|a, b| b.cmp(a));
         counts.dedup();
@@ -462,11 +431,10 @@ impl Study {
         file: &ExternalFile,
         here: &Provenance,
     ) -> Item {
-        let params = serde_json::to_value(&file.params).and_then(serde_json::from_value);
         let method = MethodSpec {
             id: GIVEN.to_owned(),
             name: Some(file.name.clone()),
-            params: params.expect("plain data"),
+            params: file.params.clone(),
             fingerprint: Some(file.hash.clone()),
         };
         // The program that measures it; its own hash is the fingerprint.

@@ -400,7 +400,7 @@ impl Study {
         let methods = self.entries(registry)?;
         let sources = self.sources()?;
         let names = unique_names(&sources);
-        let files = self.external_files(&names)?;
+        let (files, _) = self.external_files(&names)?;
         let mut items = Vec::new();
         for (source, mesh) in sources.iter().zip(names) {
             // Without loading it: a refused file is a row of the results, not an error of the study.
