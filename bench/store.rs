@@ -33,7 +33,8 @@ const FOLDERS: [&str; 5] = [AXES, "pictures", "plots", "tables", "views"];
 
 /// A folder of results that this process may add to.
 pub struct Store {
-    dir: PathBuf,
+    /// The folder.
+    pub dir: PathBuf,
     /// Held as long as the store is open.
     _lock: File,
     journal: Journal,
@@ -66,10 +67,6 @@ impl Store {
         }
         let journal = Journal::open(&path)?;
         Ok(Self { dir: dir.to_owned(), _lock: lock, journal, known, added: 0, remarks, was_cut })
-    }
-
-    pub fn dir(&self) -> &Path {
-        &self.dir
     }
 
     /// Removes all records, the results that they name and the page. Other files in the folder belong to the user and

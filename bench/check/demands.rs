@@ -49,10 +49,22 @@ pub(super) fn unknown_parameter(subject: &Subject<'_>) -> CaseResult {
     let mut params = subject.params.clone();
     params.set(UNKNOWN, "1");
     (subject.doing)("preparing with an unknown parameter");
-    match subject.method.prepare(&shape, &params, &RunContext::default()) {
-        Err(SimplifyError::Parameter(_)) => Ok(vec![]),
-        Err(error) => failed(format!("`{UNKNOWN}`: expected `Parameter`, found: {error}")),
-        Ok(_) => failed(format!("it accepts the unknown parameter `{UNKNOWN}`")),
+    let prepared = subject.method.prepare(&shape, &params, &RunContext::default());
+    let is_right = |error: &SimplifyError| matches!(error, SimplifyError::Parameter(_));
+    refused(&format!("`{UNKNOWN}`"), prepared, "Parameter", is_right)
+}
+
+/// Demands an error of the right kind.
+fn refused<T>(
+    place: &str,
+    outcome: Result<T, SimplifyError>,
+    expected: &str,
+    is_right: impl Fn(&SimplifyError) -> bool,
+) -> CaseResult {
+    match outcome {
+        Err(error) if is_right(&error) => Ok(vec![]),
+        Err(error) => failed(format!("{place}: expected `{expected}`, found: {error}")),
+        Ok(_) => failed(format!("{place}: expected `{expected}`, found a result")),
     }
 }
 
@@ -204,14 +216,12 @@ pub(super) fn no_spheres(subject: &Subject<'_>) -> CaseResult {
     let shape = corpus_shape("sphere");
     let mut simplification = subject.prepare(&shape)?;
     (subject.doing)("trying 0 spheres");
-    match simplification.at(Level::Spheres(0)) {
-        Err(SimplifyError::Level(_) | SimplifyError::Unsupported { .. }) => Ok(vec![]),
-        Err(error) => failed(format!("0 spheres: expected `Level`, found: {error}")),
-        Ok(result) => {
-            let spheres = result.mesh.spheres.len();
-            failed(format!("0 spheres: expected `Level`, found {spheres} spheres"))
-        }
-    }
+    refused("0 spheres", simplification.at(Level::Spheres(0)), "Level", is_no_level)
+}
+
+/// The errors of a level that is out of range.
+fn is_no_level(error: &SimplifyError) -> bool {
+    matches!(error, SimplifyError::Level(_) | SimplifyError::Unsupported { .. })
 }
 
 fn at_count(
@@ -242,23 +252,19 @@ pub(super) fn native_level(subject: &Subject<'_>) -> CaseResult {
     let mut simplification = subject.prepare(&shape)?;
     if subject.method.info().native.is_none() {
         (subject.doing)("trying native level 1");
-        return match simplification.at(Level::Native(1.0)) {
-            Err(SimplifyError::Unsupported { .. }) => Ok(vec![]),
-            Err(error) => failed(format!("native level: expected `Unsupported`, found: {error}")),
-            Ok(_) => failed("it accepts a native level, but its description has none"),
-        };
+        let outcome = simplification.at(Level::Native(1.0));
+        let is_right = |error: &SimplifyError| matches!(error, SimplifyError::Unsupported { .. });
+        return refused("a native level, without one", outcome, "Unsupported", is_right);
     }
     // -1 is finite, and below the range of every level that a paper has.
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1.0] {
         let level = Level::Native(value);
         (subject.doing)(&level.to_string());
-        match simplification.at(level) {
-            Err(SimplifyError::Level(_) | SimplifyError::Unsupported { .. }) => {}
-            // Exception: only the program itself has the range of its level, and refuses by its exit code.
-            Err(SimplifyError::Failed(_)) if subject.external && value == -1.0 => {}
-            Err(error) => return failed(format!("{level}: expected `Level`, found: {error}")),
-            Ok(_) => return failed(format!("{level}: expected `Level`, found a result")),
-        }
+        // Exception: only the program itself has the range of its level, and refuses by its exit code.
+        let may_fail = subject.external && value == -1.0;
+        refused(&level.to_string(), simplification.at(level), "Level", |error| {
+            is_no_level(error) || may_fail && matches!(error, SimplifyError::Failed(_))
+        })?;
     }
     let near = subject.level(simplification.as_mut(), 20)?;
     let used = subject.at(simplification.as_mut(), &shape, near)?.native_level;
@@ -421,19 +427,10 @@ pub(super) fn difference(
 /// Longest time to end after a cancellation.
 const SOON: Duration = Duration::from_secs(10);
 /// After this time, methods are running or done.
-const AT_WORK: Duration = Duration::from_millis(50);
+pub(super) const AT_WORK: Duration = Duration::from_millis(50);
 
-/// Cancelled before the first level.
-pub(super) fn cancelled_before(subject: &Subject<'_>) -> CaseResult {
-    cancelled(subject, Duration::ZERO)
-}
-
-/// Cancelled while the method runs.
-pub(super) fn cancelled_within(subject: &Subject<'_>) -> CaseResult {
-    cancelled(subject, AT_WORK)
-}
-
-fn cancelled(subject: &Subject<'_>, delay: Duration) -> CaseResult {
+/// Cancelled before the first level, or after a delay, while the method runs.
+pub(super) fn cancelled(subject: &Subject<'_>, delay: Duration) -> CaseResult {
     let shape = corpus_shape("bracket");
     // Substrates are not part of the method, and their time does not count.
     let _ = shape.view().initial();

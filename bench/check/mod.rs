@@ -4,6 +4,8 @@
 //! processes and limits. The runner starts it in a separate worker, so that a case that panics, hangs
 //! or takes all memory fails. Where the contract is open, the demand has a commented exception.
 
+use std::time::Duration;
+
 use medial::complex::MedialMesh;
 use medial::shape::Shape;
 use medial::simplifier::{
@@ -97,8 +99,12 @@ pub fn cases() -> &'static [Case] {
         ),
         case("threads", "has the same result with 1, 2 and 5 threads", threads),
         case("scale", "has the same result in other units", scale),
-        case("cancelled-before", "ends soon when cancelled before the start", cancelled_before),
-        case("cancelled-within", "ends soon when cancelled during the run", cancelled_within),
+        case("cancelled-before", "ends soon when cancelled before the start", |s| {
+            cancelled(s, Duration::ZERO)
+        }),
+        case("cancelled-within", "ends soon when cancelled during the run", |s| {
+            cancelled(s, AT_WORK)
+        }),
         case("given-initial", "starts from a given medial mesh, or refuses it", given_initial),
     ];
     CASES

@@ -156,7 +156,7 @@ fn requested_records(
 ) -> Result<Vec<Record>, Failure> {
     let keys = items.iter().flat_map(|item| contender.supervisors[0].own(item).keys());
     let keys: HashSet<String> = keys.collect();
-    let mut records = some_records(contender.store.dir(), global)?;
+    let mut records = some_records(&contender.store.dir, global)?;
     records.retain(|record| keys.contains(&record.key));
     Ok(records)
 }

@@ -23,8 +23,7 @@ use std::time::{Duration, Instant};
 use medial_run::item::{Item, Limits};
 use medial_run::level::Target;
 use medial_run::outcome::failure_record;
-use medial_run::record::Provenance;
-use medial_run::record::{Record, Repetition, Status};
+use medial_run::record::{Provenance, Record, Repetition, Status};
 use medial_run::scene::SceneSpec;
 use medial_run::timed::Fault;
 
@@ -290,12 +289,12 @@ impl<'a> Supervisor<'a> {
             // The memory limit of the worker does not cover the programs that it started.
             if looked.elapsed() >= LOOK_AGAIN {
                 looked = Instant::now();
-                if worker.resident_bytes() > limits.bytes {
+                if worker.tree.resident_bytes() > limits.bytes {
                     worker.end();
                     return Ok(Attempt::Ended(stage, out_of_memory(stage, &limits)));
                 }
             }
-            match worker.listen(LOOK_AGAIN) {
+            match worker.events.recv_timeout(LOOK_AGAIN) {
                 Ok(Event::Ready(PROTOCOL)) => worker.is_ready = true,
                 Ok(event) if !worker.is_ready => {
                     let found = match event {

@@ -3,14 +3,12 @@
 //! Requests go to the worker's standard input. Events come from its standard output, each on a line
 //! that begins with `MARK`. Methods may print there, too: lines without the mark are ignored.
 
-use std::io;
-use std::io::{BufRead, Read, Write};
+use std::io::{self, BufRead, Read, Write};
 use std::path::PathBuf;
 
 use medial_run::item::{Item, Limits, MethodSpec};
 use medial_run::level::Target;
-use medial_run::record::Provenance;
-use medial_run::record::{Record, Repetition};
+use medial_run::record::{Provenance, Record, Repetition};
 use medial_run::timed::Fault;
 use serde::{Deserialize, Serialize};
 

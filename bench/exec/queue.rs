@@ -15,8 +15,7 @@ use medial_reports::reasons;
 use medial_run::hash::hex_digest;
 use medial_run::item::{Item, MethodSpec};
 use medial_run::outcome::median;
-use medial_run::record::Provenance;
-use medial_run::record::{Record, Status};
+use medial_run::record::{Provenance, Record, Status};
 
 use crate::exec::{Supervisor, merge};
 use crate::exit::Failure;

@@ -8,8 +8,7 @@ use std::io::BufRead;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::process::ExitCode;
-use std::sync::mpsc;
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
 use std::{io, thread};
 
@@ -18,12 +17,10 @@ use medial::shape::ShapeOptions;
 use medial::simplifier::{Level, MethodInfo, RunContext, SimplifyError};
 use medial_run::hash::mesh_hash;
 use medial_run::input::{Input, Source};
-use medial_run::item::GIVEN;
-use medial_run::item::{Item, MethodSpec};
+use medial_run::item::{GIVEN, Item, MethodSpec};
 use medial_run::journal::to_line;
 use medial_run::outcome::{failure_record, record, repetition};
-use medial_run::record::Provenance;
-use medial_run::record::Status;
+use medial_run::record::{Provenance, Status};
 use medial_run::scene::{Scene, judge};
 use medial_run::timed::{Bounds, Budget, Fault, LevelRun, answer, panic_message, preparing};
 

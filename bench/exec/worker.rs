@@ -3,7 +3,7 @@
 use std::io::{BufReader, Write};
 use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::sync::mpsc::{self, Receiver};
 use std::time::{Duration, Instant};
 use std::{io, thread};
 
@@ -43,9 +43,11 @@ impl WorkerOptions {
 
 pub struct Worker {
     child: Child,
-    tree: Tree,
+    /// It, and all processes that it started.
+    pub tree: Tree,
     requests: Option<ChildStdin>,
-    events: Receiver<Event>,
+    /// Its events, until it has ended or closed its output.
+    pub events: Receiver<Event>,
     stderr: Drain,
     /// Folder for the files of the programs that it starts; removed with the worker at any kind of end.
     _scratch: TempDir,
@@ -81,17 +83,8 @@ impl Worker {
             });
         });
         let (stderr, tree) = (Drain::start(errors), Tree::of(&child));
-        let requests = Some(requests);
-        Ok(Self {
-            child,
-            tree,
-            requests,
-            events,
-            stderr,
-            _scratch: scratch,
-            is_ready: false,
-            options,
-        })
+        let (requests, _scratch, is_ready) = (Some(requests), scratch, false);
+        Ok(Self { child, tree, requests, events, stderr, _scratch, is_ready, options })
     }
 
     pub fn send(&mut self, request: &Request) -> io::Result<()> {
@@ -100,17 +93,6 @@ impl Worker {
         line.push(b'\n');
         requests.write_all(&line)?;
         requests.flush()
-    }
-
-    /// The next event, if it comes within `patience`. [`RecvTimeoutError::Disconnected`] when the process has
-    /// ended, or closed its output.
-    pub fn listen(&self, patience: Duration) -> Result<Event, RecvTimeoutError> {
-        self.events.recv_timeout(patience)
-    }
-
-    /// Resident bytes of the worker and of all processes that it started.
-    pub fn resident_bytes(&mut self) -> u64 {
-        self.tree.resident_bytes()
     }
 
     /// Kills the worker and everything that it started, and returns its exit status.
