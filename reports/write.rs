@@ -1,8 +1,7 @@
 //! Writing a report: tables, plots and the page into one folder.
 
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;

@@ -5,8 +5,7 @@ use std::time::Instant;
 use medial::complex::MedialMesh;
 use medial::metrics::{Evaluation, Judge, MetricError};
 use medial::shape::Shape;
-use medial::surface;
-use medial::surface::{SurfaceReport, TriMesh};
+use medial::surface::{self, SurfaceReport, TriMesh};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

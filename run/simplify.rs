@@ -3,8 +3,7 @@
 use std::cell::Cell;
 use std::convert::Infallible;
 
-use medial::complex;
-use medial::complex::MedialMesh;
+use medial::complex::{self, MedialMesh};
 use medial::metrics::{JudgeOptions, topology_warning};
 use medial::shape::Shape;
 use medial::simplifier::{MedialSimplifier, Params, RunContext, Simplified, SimplifyError};

@@ -6,8 +6,7 @@ use std::{env, fs};
 
 use clap::{Args, Subcommand};
 use medial::surface;
-use medial_datasets::published;
-use medial_datasets::published::{Published, Set};
+use medial_datasets::published::{self, Published, Set};
 use medial_run::input::{Input, Source};
 use medial_run::library::{Library, State};
 use serde_json::{Value, json};

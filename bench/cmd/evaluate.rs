@@ -157,50 +157,40 @@ fn print_table(
         print_json(&json!({ "files": files }), warnings);
         return;
     }
-    let (mut heads, mut evaluations) = (vec![String::new()], Vec::new());
-    for (file, row) in files.iter().zip(rows) {
-        if let Ok(row) = row {
-            heads.push(file.file_name().unwrap_or_default().to_string_lossy().into_owned());
-            evaluations.push(&row.evaluation);
-        }
-    }
-    let mut table = vec![heads];
-    table
-        .extend(["spheres", "edges", "faces", "Betti numbers"].map(|title| vec![title.to_owned()]));
-    for evaluation in &evaluations {
-        let counts = &evaluation.counts;
-        table[1].push(counts.spheres.to_string());
-        table[2].push(counts.edges.to_string());
-        table[3].push(counts.faces.to_string());
-        table[4].push(format!("{:?}", evaluation.betti));
-    }
+    let measured =
+        files.iter().zip(rows).filter_map(|(file, row)| Some((file, row.as_ref().ok()?)));
+    let measured: Vec<(&PathBuf, &Evaluated)> = measured.collect();
+    let name = |file: &Path| file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let evaluations: Vec<&Evaluation> = measured.iter().map(|(_, row)| &row.evaluation).collect();
+    let row = |title: &str, cell: fn(&Evaluation) -> String| -> (String, Vec<String>) {
+        (title.to_owned(), evaluations.iter().map(|evaluation| cell(evaluation)).collect())
+    };
+    let mut table = vec![
+        (String::new(), measured.iter().map(|(file, _)| name(file)).collect()),
+        row("spheres", |e| e.counts.spheres.to_string()),
+        row("edges", |e| e.counts.edges.to_string()),
+        row("faces", |e| e.counts.faces.to_string()),
+        row("Betti numbers", |e| format!("{:?}", e.betti)),
+    ];
     if evaluations.iter().any(|evaluation| evaluation.structure.is_some()) {
-        let sizes = |e: &&Evaluation| {
-            e.structure
-                .as_ref()
-                .map(|s| &s.graph)
-                .map(|g| format!("{} / {} / {}", g.sheets, g.seams, g.junctions))
-        };
-        let mut row = vec!["sheets / seams / junctions".to_owned()];
-        row.extend(evaluations.iter().map(|e| sizes(e).unwrap_or_default()));
-        table.push(row);
+        table.push(row("sheets / seams / junctions", |e| {
+            let graph = e.structure.as_ref().map(|structure| &structure.graph);
+            let words = graph.map(|g| format!("{} / {} / {}", g.sheets, g.seams, g.junctions));
+            words.unwrap_or_default()
+        }));
     }
-    table.extend(measured_rows(&evaluations).into_iter().map(|(metric, mut values)| {
-        values.insert(0, metric);
-        values
-    }));
-    let widths: Vec<usize> = (0..table[0].len())
-        .map(|column| table.iter().map(|row| row[column].chars().count()).max().unwrap_or(0))
-        .collect();
-    for row in &table {
-        let mut line = format!("{:<width$}", row[0], width = widths[0]);
-        for (cell, width) in row.iter().zip(&widths).skip(1) {
+    table.extend(measured_rows(&evaluations));
+    let width = |texts: &mut dyn Iterator<Item = &String>| texts.map(|t| t.chars().count()).max();
+    let titles = width(&mut table.iter().map(|(title, _)| title)).unwrap_or(0);
+    for (title, cells) in &table {
+        let mut line = format!("{title:<titles$}");
+        for (k, cell) in cells.iter().enumerate() {
+            let width = width(&mut table.iter().map(|(_, cells)| &cells[k])).unwrap_or(0);
             line.push_str(&format!("  {cell:>width$}"));
         }
         print_line(line.trim_end());
     }
-    for (file, row) in files.iter().zip(rows) {
-        let Ok(row) = row else { continue };
+    for (file, row) in measured {
         for warning in row.evaluation.warnings.iter().chain(&row.defects) {
             print_line(&format!("warning: {}: {warning}", file.display()));
         }

@@ -6,7 +6,7 @@ use clap::Args;
 use medial::surface::{self, Components, MendOptions, WrapOptions};
 use serde_json::json;
 
-use crate::args::Global;
+use crate::args::{Global, positive};
 use crate::exit::{Exit, Failure};
 use crate::files::{check_apart, check_folder};
 use crate::output::print_result;
@@ -26,7 +26,7 @@ pub struct Arguments {
     /// ALPHA is a fraction of the bounding box's diagonal, 0.01 by default. Openings narrower than about twice ALPHA and enclosed
     /// cavities are filled. The vertices of the new surface are ALPHA / 30 away from the input. The number of faces grows with
     /// 1 / ALPHA^2.
-    #[arg(long, value_name = "ALPHA", conflicts_with = "fill_holes")]
+    #[arg(long, value_name = "ALPHA", conflicts_with = "fill_holes", value_parser = positive)]
     wrap: Option<Option<f64>>,
     /// Keep all parts, the largest, the N largest, or those with a SHARE of the area (0.01 drops dust). A part has its cavities.
     #[arg(long, default_value = "all", value_name = "all|largest|N|SHARE")]
@@ -42,7 +42,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let options = MendOptions { fill_holes, components };
     // An error unless the repaired surface bounds a solid.
     let inspected = match arguments.wrap {
-        Some(alpha) => surface::inspect_wrapped(&arguments.input, wrap_options(alpha)?),
+        Some(alpha) => {
+            let options = alpha.map_or_else(WrapOptions::default, WrapOptions::with_alpha);
+            surface::inspect_wrapped(&arguments.input, options)
+        }
         None => surface::inspect(&arguments.input),
     };
     let repaired = inspected.and_then(|found| found.mend(options)).map_err(Failure::input)?;
@@ -56,12 +59,4 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let mut text = format!("{output}: {vertices} vertices, {faces} faces");
     report.repairs.iter().for_each(|repair| text += &format!("\n  repaired: {repair}"));
     Ok(print_result(global, &object, &text, &report.warnings))
-}
-
-fn wrap_options(alpha: Option<f64>) -> Result<WrapOptions, Failure> {
-    match alpha {
-        None => Ok(WrapOptions::default()),
-        Some(alpha) if alpha > 0.0 && alpha.is_finite() => Ok(WrapOptions::with_alpha(alpha)),
-        Some(_) => Err(Failure::usage("--wrap must be a positive fraction, for example 0.02")),
-    }
 }

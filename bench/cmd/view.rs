@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use medial::Vec3;
 use medial::complex::{self, MedialMesh};
+use medial::geometry::trees::Bounds;
 use medial::surface::TriMesh;
 use medial_reports::View3d;
 use medial_run::input::{Input, Source};
@@ -70,14 +71,10 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
 
 /// The corners of the box of some unions, without faces, for the camera.
 fn box_of(axes: &[MedialMesh]) -> TriMesh {
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for sphere in axes.iter().flat_map(|axis| &axis.spheres) {
-        low = low.min(sphere.centre - sphere.radius);
-        high = high.max(sphere.centre + sphere.radius);
-    }
-    let corner = |k: u32| {
-        let of = |axis: usize| if k >> axis & 1 == 0 { low[axis] } else { high[axis] };
-        Vec3::new(of(0), of(1), of(2))
-    };
+    let spheres = axes.iter().flat_map(|axis| &axis.spheres);
+    let Bounds { lo, hi } =
+        Bounds::of_points(spheres.flat_map(|s| [s.centre - s.radius, s.centre + s.radius]));
+    let corner =
+        |k: u32| Vec3::from([0, 1, 2].map(|c| if k >> c & 1 == 0 { lo[c] } else { hi[c] }));
     TriMesh { vertices: (0..8).map(corner).collect(), faces: vec![] }
 }

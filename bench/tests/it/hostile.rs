@@ -216,7 +216,7 @@ fn surfaces_and_points_that_bound_no_solid_are_wrapped() {
 #[test]
 fn a_wrap_without_a_radius_or_with_wrong_input_is_refused() {
     let at = Folder::new();
-    let positive = "--wrap must be a positive fraction";
+    let positive = "expected a positive number";
     for (text, options, code, why) in [
         (UNFIT[0], "--wrap=0", 2, positive),
         (UNFIT[0], "--wrap=-0.1", 2, positive),
