@@ -13,8 +13,8 @@ use medial_run::text::{counted, grouped, significant};
 
 use crate::comparison::{Comparison, Entry, reached};
 use crate::metric::{CENTRALITY, COMPLETENESS, HAUSDORFF, MIN_ANGLE, TOTAL_SECONDS, median};
-use crate::statistics::{FEWEST, Pairs, Sample};
-use crate::summary::{Ratio, reference, topology};
+use crate::statistics::{FEWEST, Pairs, Ratio, Sample};
+use crate::summary::{reference, topology};
 use crate::tables::{Cell, Column, Table};
 
 /// The table compares results at the requested count nearest to this one.
@@ -298,13 +298,12 @@ pub(crate) fn ranked(values: &[Values]) -> Vec<Rank> {
 
 /// The row of a criterion: that of the best median. None if no method has a median.
 fn criterion_row(comparison: &Comparison<'_>, criterion: &Criterion) -> Option<Vec<Cell>> {
-    let ranks = ranked(&criterion.values);
-    (!ranks.is_empty()).then(|| row_of(comparison, criterion, &ranks))
+    row_of(comparison, criterion, &ranked(&criterion.values))
 }
 
-/// The row of the first of the ranked methods.
-fn row_of(comparison: &Comparison<'_>, criterion: &Criterion, ranks: &[Rank]) -> Vec<Cell> {
-    let first = ranks[0].series;
+/// The row of the first of the ranked methods, if there is one.
+fn row_of(comparison: &Comparison<'_>, criterion: &Criterion, ranks: &[Rank]) -> Option<Vec<Cell>> {
+    let first = ranks.first()?.series;
     let pairs =
         Pairs::of(ranks.iter().map(|rank| rank.series).collect(), &samples(&criterion.values));
     let known = criterion.values[first].iter().flatten();
@@ -323,10 +322,8 @@ fn row_of(comparison: &Comparison<'_>, criterion: &Criterion, ranks: &[Rank]) ->
     ];
     let runner_up = ranks.get(1).map(|rank| rank.series);
     let pair = runner_up.and_then(|second| pairs.between(first, second));
-    let ratio = pair.as_ref().and_then(|pair| {
-        let ratio = pair.ratio_text()?;
-        Some(format!("{ratio} of {}", criterion.of))
-    });
+    let ratio = pair.as_ref().and_then(|pair| pair.ratio);
+    let ratio = ratio.map(|ratio| format!("{} of {}", ratio.text(2), criterion.of));
     cells.extend([
         Cell::from(runner_up.map_or("no other", |second| comparison.series[second].as_str())),
         Cell::optional(ratio),
@@ -335,7 +332,7 @@ fn row_of(comparison: &Comparison<'_>, criterion: &Criterion, ranks: &[Rank]) ->
             (meshes, false) => format!("no, n = {meshes}"),
         })),
     ]);
-    cells
+    Some(cells)
 }
 
 /// The row of the methods with the topology of the solid on every mesh, the one of the lowest error first.
@@ -350,12 +347,11 @@ fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) ->
         right > 0 && right == errors[series].iter().flatten().count()
     });
     let title = format!("topology right everywhere, lowest error at {spheres}");
-    if ranks.is_empty() {
-        let mut cells = vec![Cell::from(title), Cell::from("none")];
-        cells.extend([(); 6].map(|()| Cell::optional(None)));
-        return cells;
-    }
-    row_of(comparison, &error_criterion(errors, title), &ranks)
+    let criterion = error_criterion(errors, title);
+    row_of(comparison, &criterion, &ranks).unwrap_or_else(|| {
+        let none = [(); 6].map(|()| Cell::optional(None));
+        [criterion.title.into(), "none".into()].into_iter().chain(none).collect()
+    })
 }
 
 /// One method at one error bound.
@@ -374,11 +370,11 @@ impl<'c> BoundRow<'c> {
     fn new(percent: f64, entries: Vec<&'c Entry<'c>>, yardstick: &[&Entry<'_>]) -> Self {
         let met: Vec<&Entry<'_>> =
             entries.iter().copied().filter(|entry| entry.measured()).collect();
-        let ratios = met.iter().filter_map(|entry| {
+        let logs = met.iter().filter_map(|entry| {
             let other = yardstick.iter().find(|o| o.mesh == entry.mesh && o.measured())?;
-            Some(reached(entry.record)? as f64 / reached(other.record)? as f64)
+            Some((reached(entry.record)? as f64 / reached(other.record)? as f64).ln())
         });
-        let ratio = Ratio::of(ratios);
+        let ratio = Ratio::of_logs(&logs.collect::<Vec<_>>());
         Self { percent, entries, met, ratio }
     }
 
@@ -432,7 +428,7 @@ pub(crate) fn equal_error_table(comparison: &Comparison<'_>, how: &str) -> Optio
         .text("valid on", |row| format!("{} of {}", row.met.len(), row.entries.len()))
         .number("spheres ↓", |row| whole(row.spheres()))
         .number(format!("÷ {yardstick}"), |row| {
-            Cell::optional(row.ratio.as_ref().map(Ratio::text))
+            Cell::optional(row.ratio.map(|ratio| ratio.text(3)))
         })
         .text("on", |row| {
             Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes")))

@@ -354,9 +354,6 @@ fn short(hash: &str) -> String {
     hash.chars().take(8).collect()
 }
 
-/// The end of the mark of an edition's row whose method has changed since.
-const OTHER_VERSION: &str = ", other version";
-
 /// The identity of a row: the method with its parameters, and the conditions of the run. Records of two builds, of
 /// two samplings or of two accuracies of measuring are never in one mean.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -414,27 +411,7 @@ impl<'a> SeriesKey<'a> {
     fn request(&self) -> Self {
         Self { build: "", plugin: None, ..self.clone() }
     }
-}
 
-/// The row's name, or method and parameters, and each condition in which rows of one name differ.
-fn series_labels(keys: &[SeriesKey<'_>]) -> Vec<String> {
-    let mut labels = vec![];
-    for key in keys {
-        let mut label = key.name();
-        let namesakes: Vec<[String; 8]> =
-            keys.iter().filter(|other| other.name() == label).map(SeriesKey::conditions).collect();
-        for (index, condition) in key.conditions().into_iter().enumerate() {
-            // A condition that all rows of the name share does not distinguish them.
-            if namesakes.iter().any(|other| other[index] != condition) {
-                label = label + ", " + &condition;
-            }
-        }
-        labels.push(printable(&label));
-    }
-    labels
-}
-
-impl<'a> SeriesKey<'a> {
     /// The id of its [`MethodNote`](crate::MethodNote).
     fn described_as(&self) -> &'a str {
         self.variant.filter(|_| self.is_external).unwrap_or(self.method)
@@ -442,7 +419,7 @@ impl<'a> SeriesKey<'a> {
 
     fn name(&self) -> String {
         let name = self.variant.map_or_else(|| self.method_and_params(), str::to_owned);
-        let other = if self.is_other_version { OTHER_VERSION } else { "" };
+        let other = if self.is_other_version { ", other version" } else { "" };
         self.edition.map_or(name.clone(), |edition| format!("{name} ({edition}{other})"))
     }
 
@@ -463,4 +440,22 @@ impl<'a> SeriesKey<'a> {
             format!("plug-in {}", short(self.plugin.unwrap_or("none"))),
         ]
     }
+}
+
+/// The row's name, or method and parameters, and each condition in which rows of one name differ.
+fn series_labels(keys: &[SeriesKey<'_>]) -> Vec<String> {
+    let mut labels = vec![];
+    for key in keys {
+        let mut label = key.name();
+        let namesakes: Vec<[String; 8]> =
+            keys.iter().filter(|other| other.name() == label).map(SeriesKey::conditions).collect();
+        for (index, condition) in key.conditions().into_iter().enumerate() {
+            // A condition that all rows of the name share does not distinguish them.
+            if namesakes.iter().any(|other| other[index] != condition) {
+                label = label + ", " + &condition;
+            }
+        }
+        labels.push(printable(&label));
+    }
+    labels
 }

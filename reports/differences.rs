@@ -29,7 +29,9 @@ pub(crate) fn difference_tables(comparison: &Comparison<'_>, how: &str) -> Vec<T
         };
         let rows = Table::of(&pairs.series)
             .text("method", |&series| name(series))
-            .text(format!("Hausdorff ÷ {}", name(first)), |&s| cell(s, Paired::ratio_text))
+            .text(format!("Hausdorff ÷ {}", name(first)), |&s| {
+                cell(s, |pair| Some(pair.ratio?.text(2)))
+            })
             .number("n", |&s| cell(s, |pair| Some(pair.meshes().to_string())))
             .text("better, equal, worse", |&s| {
                 cell(s, |pair| Some(pair.outcomes.map(|count| count.to_string()).join(", ")))
@@ -83,8 +85,9 @@ pub(crate) fn differences_csv(comparison: &Comparison<'_>) -> Result<Vec<u8>, cs
             let mut row = vec![spheres.to_string()];
             row.extend(names.map(|series| comparison.series[series].clone()));
             row.extend(pair.outcomes.map(|count| count.to_string()));
-            row.push(known(pair.ratio));
-            row.extend([0, 1].map(|end| known(pair.interval.map(|ends| ends[end]))));
+            row.push(known(pair.ratio.map(|ratio| ratio.value)));
+            let interval = pair.ratio.and_then(|ratio| ratio.interval);
+            row.extend([0, 1].map(|end| known(interval.map(|ends| ends[end]))));
             row.extend([pair.effect, pair.p, pair.corrected].map(|value| value.to_string()));
             writer.write_record(row)?;
         }

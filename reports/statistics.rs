@@ -13,6 +13,8 @@
 use medial::geometry::hash::splitmix;
 use medial_run::text::significant;
 
+use crate::metric::Mean;
+
 /// Probability of calling any difference of a table established although there is none.
 pub(crate) const LEVEL: f64 = 0.05;
 
@@ -29,15 +31,38 @@ const SEED: u64 = 0;
 /// For each mesh the value of a method, infinite without a result; `None` where the method did not run.
 pub(crate) type Sample = Vec<Option<f64>>;
 
+/// The geometric mean of one ratio for each mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Ratio {
+    pub(crate) value: f64,
+    /// Number of meshes.
+    pub(crate) meshes: usize,
+    /// The 95 % interval over meshes.
+    pub(crate) interval: Option<[f64; 2]>,
+}
+
+impl Ratio {
+    /// From the logarithms of the ratios; `None` without any.
+    pub(crate) fn of_logs(logs: &[f64]) -> Option<Self> {
+        let (value, meshes) = (Mean::Arithmetic.of(logs)?.exp(), logs.len());
+        Some(Self { value, meshes, interval: interval_of_logs(logs) })
+    }
+
+    /// The mean with some digits, and its interval: `0.205 [0.17, 0.25]`.
+    pub(crate) fn text(&self, digits: usize) -> String {
+        let ends = self.interval.map(|ends| ends.map(|end| significant(end, 2)).join(", "));
+        let ends = ends.map_or_else(String::new, |ends| format!(" [{ends}]"));
+        significant(self.value, digits) + &ends
+    }
+}
+
 /// Two methods on the meshes that both ran on.
 #[derive(Clone, Debug)]
 pub(crate) struct Paired {
     /// Meshes where the first has the smaller value, where both are equal, and where it has the larger one.
     pub(crate) outcomes: [usize; 3],
-    /// Geometric mean of the ratios of the first to the second, over the meshes where both have a result.
-    pub(crate) ratio: Option<f64>,
-    /// Its 95 % interval.
-    pub(crate) interval: Option<[f64; 2]>,
+    /// The ratio of the first to the second, over the meshes where both have a result.
+    pub(crate) ratio: Option<Ratio>,
     /// Share of the rank sum in favour of the first minus that in favour of the second.
     pub(crate) effect: f64,
     /// Probability of a rank sum at least as extreme if no method is better.
@@ -57,17 +82,18 @@ impl Paired {
         let count = |is: fn(&f64) -> bool| differences.iter().filter(|d| is(d)).count();
         let outcomes = [count(|&d| d < 0.0), count(|&d| d == 0.0), count(|&d| d > 0.0)];
         let finite: Vec<f64> = differences.iter().copied().filter(|d| d.is_finite()).collect();
-        let ratio = (!finite.is_empty()).then(|| mean(&finite).exp());
         let (effect, p) = signed_ranks(&differences);
-        Self { outcomes, ratio, interval: interval_of_logs(&finite), effect, p, corrected: p }
+        Self { outcomes, ratio: Ratio::of_logs(&finite), effect, p, corrected: p }
     }
 
     /// The second in relation to the first.
     fn inverse(mut self) -> Self {
         self.outcomes.reverse();
-        let ratio = self.ratio.map(f64::recip);
-        let interval = self.interval.map(|[low, high]| [high.recip(), low.recip()]);
-        Self { ratio, interval, effect: 0.0 - self.effect, ..self }
+        let ratio = self.ratio.map(|Ratio { value, meshes, interval }| {
+            let interval = interval.map(|[low, high]| [high.recip(), low.recip()]);
+            Ratio { value: value.recip(), meshes, interval }
+        });
+        Self { ratio, effect: 0.0 - self.effect, ..self }
     }
 
     /// Meshes with a result of either.
@@ -78,15 +104,6 @@ impl Paired {
     /// Whether the difference is larger than chance explains.
     pub(crate) fn is_established(&self) -> bool {
         self.meshes() >= FEWEST && self.corrected < LEVEL
-    }
-
-    /// The ratio with its interval: `0.30 [0.25, 0.36]`.
-    pub(crate) fn ratio_text(&self) -> Option<String> {
-        let ratio = significant(self.ratio?, 2);
-        Some(match self.interval.map(|ends| ends.map(|end| significant(end, 2))) {
-            Some([low, high]) => format!("{ratio} [{low}, {high}]"),
-            None => ratio,
-        })
     }
 }
 
@@ -176,10 +193,6 @@ fn holm(p: &[f64]) -> Vec<f64> {
         corrected[i] = largest;
     }
     corrected
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }
 
 /// The 95 % interval of a geometric mean over meshes; `None` of fewer than [`FEWEST`] positive values.

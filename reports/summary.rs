@@ -18,9 +18,9 @@ use medial_run::text::{counted, grouped, significant, trimmed};
 use crate::comparison::{Comparison, Entry, level_label, reached};
 use crate::header::Header;
 use crate::metric::{
-    COMPLETENESS, GEOMETRIC, HAUSDORFF, LARGER_SIDE, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS,
+    COMPLETENESS, GEOMETRIC, HAUSDORFF, LARGER_SIDE, MEAN_ERROR, Metric, TOTAL_SECONDS,
 };
-use crate::statistics::interval;
+use crate::statistics::{Ratio, interval};
 use crate::tables::{Cell, Table};
 
 /// The method that others are put in relation to, where it ran with its defaults.
@@ -54,34 +54,6 @@ pub(crate) struct SeriesSummary {
     /// Results with the Betti numbers of the solid, of those where both are known; over all meshes
     /// on which it reached the count.
     pub(crate) topology: (usize, usize),
-}
-
-/// One method in relation to the reference, over the meshes that both reached.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Ratio {
-    /// Geometric mean of the ratios.
-    pub(crate) value: f64,
-    /// Number of meshes.
-    pub(crate) meshes: usize,
-    /// The 95 % interval over meshes.
-    interval: Option<[f64; 2]>,
-}
-
-impl Ratio {
-    /// The mean of one ratio for each mesh; `None` without any.
-    pub(crate) fn of(ratios: impl Iterator<Item = f64>) -> Option<Self> {
-        let ratios: Vec<f64> = ratios.collect();
-        // Ratios are positive: the floor is none.
-        let value = Mean::Geometric { floor: f64::MIN_POSITIVE }.of(&ratios)?;
-        Some(Self { value, meshes: ratios.len(), interval: interval(&ratios) })
-    }
-
-    /// `0.205 [0.17, 0.25]`.
-    pub(crate) fn text(&self) -> String {
-        let ends = self.interval.map(|ends| ends.map(|end| significant(end, 2)).join(", "));
-        let ends = ends.map_or_else(String::new, |ends| format!(" [{ends}]"));
-        significant(self.value, 3) + &ends
-    }
 }
 
 impl SeriesSummary {
@@ -243,12 +215,13 @@ fn at_count(
 
 /// Hausdorff errors in relation to those of the reference, on the meshes where both reached a count.
 fn ratio(entries: &[&Entry<'_>], reference: &[&Entry<'_>]) -> Option<Ratio> {
-    Ratio::of(entries.iter().filter_map(|entry| {
+    let logs = entries.iter().filter_map(|entry| {
         let other = reference.iter().find(|other| other.mesh == entry.mesh)?;
         let [own, others] = [entry, other]
             .map(|e| HAUSDORFF.of(e.record).filter(|&error| e.comparable() && error > 0.0));
-        Some(own? / others?)
-    }))
+        Some((own? / others?).ln())
+    });
+    Ratio::of_logs(&logs.collect::<Vec<_>>())
 }
 
 /// Results with the solid's Betti numbers, and results where both are known.
@@ -392,7 +365,7 @@ pub(crate) fn means_table(
         .text("method", |(_, row)| comparison.series[row.series].as_str())
         .text("means over", |(_, row)| Cell::share((row.over, row.requested)))
         .number(format!("Hausdorff ÷ {yardstick}"), |(_, row)| {
-            Cell::optional(row.ratio.as_ref().map(Ratio::text))
+            Cell::optional(row.ratio.map(|ratio| ratio.text(3)))
         })
         .text("on", |(_, row)| {
             Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes")))

@@ -190,40 +190,28 @@ fn of_one_preparation<'s>(
     prepare.usage = without(prepare.usage, without(built.usage, before.usage));
     let held = prepare.usage.held_bytes;
     let mut clock = Clock { view, is_incremental, prepare, so_far: Cost::default(), held };
-    let mut simplification = match started {
-        Ok(simplification) => simplification,
-        Err(fault) => {
-            return (levels.iter())
-                .map(|&level| LevelRun {
-                    level: level.into(),
-                    outcome: Err(fault.clone()),
-                    times: clock.times(),
-                })
-                .collect();
-        }
-    };
-    let mut broken: Option<Fault> = None;
-    let mut runs = Vec::new();
-    for &level in levels {
-        let target = level.into();
-        // A simplification that panicked is in an unknown state and must not be called again.
-        if let Some(fault) = broken.clone().or_else(|| budget.used_up()) {
-            runs.push(LevelRun { level: target, outcome: Err(fault), times: clock.times() });
-            continue;
-        }
-        on_level(level);
-        let (outcome, lap) = Cost::of(|| guarded(|| simplification.at(level)));
-        budget.has_level.set(true);
-        clock.add(lap);
-        // After the clock has stopped: checking is the harness's work.
-        let outcome = outcome.and_then(|simplified| checked(level, simplified));
-        if matches!(&outcome, Err(fault) if fault.status == Status::Panicked) {
+    // The fault of all further levels: a simplification that panicked is in an unknown state and must not be called again.
+    let mut usable = started;
+    let run = |&level: &Level| {
+        let outcome = match (&mut usable, budget.used_up()) {
+            (Err(fault), _) => Err(fault.clone()),
+            (Ok(_), Some(fault)) => Err(fault),
+            (Ok(simplification), None) => {
+                on_level(level);
+                let (outcome, lap) = Cost::of(|| guarded(|| simplification.at(level)));
+                budget.has_level.set(true);
+                clock.add(lap);
+                // After the clock has stopped: checking is the harness's work.
+                outcome.and_then(|simplified| checked(level, simplified))
+            }
+        };
+        if usable.is_ok() && outcome.as_ref().is_err_and(|fault| fault.status == Status::Panicked) {
             let reason = format!("not run: the method panicked at {level}");
-            broken = Some(Fault { status: Status::Panicked, reason });
+            usable = Err(Fault { status: Status::Panicked, reason });
         }
-        runs.push(LevelRun { level: target, outcome, times: clock.times() });
-    }
-    runs
+        LevelRun { level: level.into(), outcome, times: clock.times() }
+    };
+    levels.iter().map(run).collect()
 }
 
 /// The costs of levels, each as if it had been computed alone.

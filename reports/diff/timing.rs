@@ -25,7 +25,7 @@ use serde::Serialize;
 
 use super::results::Pair;
 use super::{ItemName, LEAST_SLOWDOWN, Meaning};
-use crate::metric::median;
+use crate::metric::{Mean, median};
 
 /// With fewer repetitions seconds are not compared.
 const LEAST_REPETITIONS: usize = 5;
@@ -250,7 +250,7 @@ impl Shift {
 }
 
 fn mean_of(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
+    Mean::Arithmetic.of(values).unwrap_or_default()
 }
 
 /// Of a sample.

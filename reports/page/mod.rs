@@ -17,7 +17,7 @@ use medial_run::text::{betti, counted, escape_html, grouped, printable};
 use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, level_label};
-use crate::header::{Header, MethodNote, RunNote, method_pages};
+use crate::header::{Header, RunNote, method_pages};
 use crate::metric::{BELOW_30, COMPARED, EPSILON, Metric, SPHERES_ONLY};
 use crate::plots::{Figure, symbol};
 use crate::tables::Table;
@@ -191,10 +191,12 @@ impl Page<'_> {
             .iter()
             .filter(|note| comparison.methods.contains(&note.id.as_str()))
             .map(|note| {
-                let mut method = described(note);
                 let page = pages.iter().find(|(other, _)| other.id == note.id);
-                method["page"] = json!(page.map(|(_, file)| format!("./{file}")));
-                method
+                json!({
+                    "id": note.id, "title": note.title, "summary": note.summary, "home": note.home,
+                    "published": note.published.trim_end_matches('.'), "citation": note.citation,
+                    "page": page.map(|(_, file)| format!("./{file}")),
+                })
             });
         let runs = &header.runs;
         let command = runs.last().map(|run| &run.command).filter(|command| !command.is_empty());
@@ -332,13 +334,6 @@ fn without_command(table: &Table) -> Table {
     let mut table = table.clone();
     table.notes.drain(..table.notes.len().min(1));
     table
-}
-
-fn described(note: &MethodNote) -> Value {
-    json!({
-        "id": note.id, "title": note.title, "summary": note.summary, "home": note.home,
-        "published": note.published.trim_end_matches('.'), "citation": note.citation,
-    })
 }
 
 fn figures(figures: &[Figure]) -> Vec<Value> {

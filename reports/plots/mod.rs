@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, Entry, reached};
 use crate::metric::{
-    COMPLETENESS, HAUSDORFF, LARGER_SIDE, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES, TOTAL_SECONDS,
+    COMPLETENESS, GEOMETRIC, HAUSDORFF, LARGER_SIDE, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES,
+    TOTAL_SECONDS,
 };
 use crate::summary::{CountSummary, NativeCurve};
 
@@ -82,17 +83,34 @@ impl Figure {
     }
 }
 
-/// A kind of figures, one for each mesh and one of the means over all: name, title, and the metric upwards.
-struct Kind(&'static str, &'static str, &'static Metric);
+/// A kind of figures, one for each mesh and one of the means over all: name, title, the metric upwards and its axis.
+struct Kind(&'static str, &'static str, &'static Metric, &'static str);
+
+const ERROR: &str = "Hausdorff error (% of diagonal)";
 
 const KINDS: [Kind; 7] = [
-    Kind("hausdorff", "Hausdorff error against spheres", &HAUSDORFF),
-    Kind("time", "Hausdorff error against time", &HAUSDORFF),
-    Kind("mean", "Mean error against spheres", &MEAN_ERROR),
-    Kind("angles", "Triangle quality: mean smallest angle", &MIN_ANGLE),
-    Kind("spikes", "Spikes left", &SPIKES),
-    Kind("structure", "Axis missed against spheres", &COMPLETENESS),
-    Kind("cover", "Uncovered or overshoot against spheres", &LARGER_SIDE),
+    Kind("hausdorff", "Hausdorff error against spheres", &HAUSDORFF, ERROR),
+    Kind("time", "Hausdorff error against time", &HAUSDORFF, ERROR),
+    Kind("mean", "Mean error against spheres", &MEAN_ERROR, "mean error (% of diagonal)"),
+    Kind(
+        "angles",
+        "Triangle quality: mean smallest angle",
+        &MIN_ANGLE,
+        "mean smallest angle (degrees)",
+    ),
+    Kind("spikes", "Spikes left", &SPIKES, "spikes"),
+    Kind(
+        "structure",
+        "Axis missed against spheres",
+        &COMPLETENESS,
+        "axis missed, p95 (% of diagonal)",
+    ),
+    Kind(
+        "cover",
+        "Uncovered or overshoot against spheres",
+        &LARGER_SIDE,
+        "larger of uncovered and overshoot (% of diagonal)",
+    ),
 ];
 
 impl Kind {
@@ -101,28 +119,16 @@ impl Kind {
         self.0 == "time"
     }
 
-    /// Whether the metric is an error, which spans orders of magnitude and of which less is better at any cost.
-    fn is_error(&self) -> bool {
-        !matches!(self.0, "angles" | "spikes")
-    }
-
     fn figure(&self, stem: &str, of: &str, mut curves: Vec<Curve>) -> Option<Figure> {
-        let Self(name, title, _) = self;
-        let y = match *name {
-            "angles" => "mean smallest angle (degrees)",
-            "spikes" => "spikes",
-            "mean" => "mean error (% of diagonal)",
-            "structure" => "axis missed, p95 (% of diagonal)",
-            "cover" => "larger of uncovered and overshoot (% of diagonal)",
-            _ => "Hausdorff error (% of diagonal)",
-        };
-        let scale = if self.is_error() { Scale::Log } else { Scale::Linear };
+        let Self(name, title, metric, y) = self;
+        // Lengths span orders of magnitude.
+        let scale = if metric.mean == GEOMETRIC { Scale::Log } else { Scale::Linear };
         curves.retain(|curve| !curve.points.is_empty()); // no legend without a mark
         (!curves.is_empty()).then(|| Figure {
             stem: format!("{stem}-{name}"),
             title: format!("{of}: {title}"),
             x: if self.is_over_time() { "time (s)".to_owned() } else { "spheres".to_owned() },
-            y: (y.to_owned(), scale),
+            y: ((*y).to_owned(), scale),
             curves,
             leading: matches!(*name, "hausdorff" | "time"),
         })

@@ -6,8 +6,8 @@ mod mesh;
 mod topics;
 
 use medial_run::text::{escape_html, printable};
-use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
+use serde_json::json;
 
 pub(crate) use self::csv::{flatten, to_csv};
 pub(crate) use self::mesh::{Best, mesh_table, remark, topology_word};
@@ -162,12 +162,7 @@ impl Serialize for Cell {
     /// Most cells are plain: a text alone keeps the page small.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let text = printable(&self.text);
-        if !self.best {
-            return serializer.serialize_str(&text);
-        }
-        let mut cell = serializer.serialize_struct("Cell", 1)?;
-        cell.serialize_field("best", &text)?;
-        cell.end()
+        if self.best { json!({ "best": text }) } else { json!(text) }.serialize(serializer)
     }
 }
 
