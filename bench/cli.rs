@@ -116,7 +116,10 @@ fn run_with(
             return Exit::Usage;
         }
     };
-    name_bugs();
+    // Panics become failures of one line, unless a backtrace is requested.
+    if std::env::var_os("RUST_BACKTRACE").is_none_or(|value| value == "0") {
+        std::panic::set_hook(Box::new(|_| ()));
+    }
     let Cli { global, verb } = cli;
     // The state after a panic is not used again.
     let outcome = catch_unwind(AssertUnwindSafe(|| {
@@ -131,13 +134,6 @@ fn run_with(
         failure.code
     });
     exit_after_output(exit)
-}
-
-/// Hides the messages of panics, which become failures of one line, unless a backtrace is requested.
-fn name_bugs() {
-    if std::env::var_os("RUST_BACKTRACE").is_none_or(|value| value == "0") {
-        std::panic::set_hook(Box::new(|_| ()));
-    }
 }
 
 /// The verbs of each group, in the order of the help.
@@ -184,9 +180,7 @@ fn registry(
     global: &Global,
 ) -> Result<Registry, Failure> {
     let mut registry = Registry::new(methods).map_err(Failure::usage)?;
-    if let Some(loader) = loader {
-        registry = registry.with_loader(loader);
-    }
+    registry.loader = loader;
     for file in &global.plugins {
         registry.add_plugins(file).map_err(Failure::usage)?;
     }

@@ -49,17 +49,17 @@ pub struct Store {
 }
 
 impl Store {
-    /// Opens or makes a folder of results, for `journal`, one of its lists of records.
+    /// Opens or makes a folder of results.
     ///
     /// Removes temporary files of an interrupted process, and with a remark an incomplete last line. Fails when it is
     /// not a folder, has other files or a link where results are written, is not writable, or another process holds it.
-    pub fn open(dir: &Path, journal: &str, command: &str) -> Result<Self, Failure> {
+    pub fn open(dir: &Path, command: &str) -> Result<Self, Failure> {
         let entries = entries_of(dir);
-        claim(dir, is_store(dir, journal), &entries)?;
+        claim(dir, is_store(dir), &entries)?;
         fs::create_dir_all(dir).map_err(io_error(dir))?;
         // Before anything is repaired: another process may be in the middle of a line.
         let lock = lock(dir, command)?;
-        let path = dir.join(journal);
+        let path = dir.join(RESULTS);
         let (known, remarks, was_cut) = read_known(&path).map_err(io_error(&path))?;
         // Temporary files of an ended process. The lock is held, so none is in use.
         for entry in entries.iter().filter(|entry| is_temporary(entry)) {
@@ -71,7 +71,7 @@ impl Store {
 
     /// Removes all records, the results that they name and the page. Other files in the folder belong to the user and
     /// stay; the next report replaces its own tables and plots.
-    pub fn clear(&mut self, journal: &str) -> Result<(), Failure> {
+    pub fn clear(&mut self) -> Result<(), Failure> {
         let artifacts = self.known.values().filter_map(|record| record.artifact.as_deref());
         for path in artifacts.filter_map(|artifact| artifact_path(&self.dir, artifact)) {
             // A remaining file without a record does not count as a result.
@@ -84,7 +84,7 @@ impl Store {
         }
         // The journal is gone: a stale state would skip what has to be run.
         self.known.clear();
-        self.journal = Journal::open(self.dir.join(journal))?;
+        self.journal = Journal::open(self.dir.join(RESULTS))?;
         Ok(())
     }
 
@@ -141,13 +141,13 @@ fn is_incomplete(record: &Record, item: &Item, retry_failed: bool) -> bool {
 }
 
 /// Whether a folder has a list of records, or the lock of a run that ended before its first one.
-pub fn is_store(dir: &Path, journal: &str) -> bool {
+pub fn is_store(dir: &Path) -> bool {
     let lock = dir.join(LOCK);
     let holder = read_regular_text(lock);
     // Another process creates it, and then writes into it.
     let is_new = |text: &str| text.is_empty() && listed(dir).count() == 1;
     let is_ours = holder.is_ok_and(|text| text.starts_with(HOLDER) || is_new(&text));
-    is_ours || dir.join(journal).exists()
+    is_ours || dir.join(RESULTS).exists()
 }
 
 /// Refuses a folder with other files, and a folder with a link or a device among its `entries`, which this program

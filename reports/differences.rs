@@ -37,7 +37,12 @@ pub(crate) fn difference_tables(comparison: &Comparison<'_>, how: &str) -> Vec<T
                 cell(s, |pair| Some(pair.outcomes.map(|count| count.to_string()).join(", ")))
             })
             .number("effect", |&s| cell(s, |pair| Some(format!("{:.2}", pair.effect))))
-            .number("p", |&s| cell(s, |pair| Some(p_text(pair.corrected))))
+            .number("p", |&s| {
+                cell(s, |pair| match pair.corrected {
+                    ..1e-4 => Some("< 0.0001".to_owned()),
+                    p => Some(significant(p, 2)),
+                })
+            })
             .text("not established to differ from", |&series| match &pairs.alike(series)[..] {
                 [] => "–".to_owned(),
                 alike if alike.len() > 1 && alike.len() + 1 == pairs.series.len() => {
@@ -65,10 +70,6 @@ const NOTE: &str = "By median Hausdorff error. Ratios are geometric means over t
     95 % intervals from 2,000 resampled sets of meshes, if they are at least six. n: meshes where either has a result; a \
     missing one, or an error above 5 %, counts as infinite. Effect: from -1, worse on all meshes, to 1. p: two-sided \
     Wilcoxon signed-rank test, corrected for all pairs of methods by Holm; established: below 0.05 on at least six meshes.";
-
-fn p_text(p: f64) -> String {
-    if p < 1e-4 { "< 0.0001".to_owned() } else { significant(p, 2) }
-}
 
 /// Every pair of methods at every number of spheres with all digits, as CSV.
 pub(crate) fn differences_csv(comparison: &Comparison<'_>) -> Result<Vec<u8>, csv::Error> {

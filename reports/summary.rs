@@ -374,7 +374,13 @@ pub(crate) fn means_table(
         rows = rows.number(metric.heading(), |(summary, row)| mean_cell(summary, row, metric));
     }
     rows = rows.text("topology right", |(_, row)| Cell::share(row.topology));
-    rows = rows.text("without a result", |(_, row)| without_result(row));
+    rows = rows.text("without a result", |(_, row)| match row.without.len() {
+        0 => "none".to_owned(),
+        _ => {
+            let parts = row.without.iter().map(|(status, count)| format!("{count} {status}"));
+            parts.collect::<Vec<_>>().join(", ")
+        }
+    });
     let notes = [
         how,
         "Geometric means of errors and total time, arithmetic means of angles, shares and \
@@ -413,11 +419,4 @@ fn mean_cell(summary: &CountSummary, row: &SeriesSummary, metric: &Metric) -> Ce
         false => format!("({text}; {over})"),
     };
     Cell { text, best }
-}
-
-/// The meshes in no mean, counted by status.
-fn without_result(row: &SeriesSummary) -> String {
-    let parts = row.without.iter().map(|(status, count)| format!("{count} {status}"));
-    let parts: Vec<String> = parts.collect();
-    if parts.is_empty() { "none".to_owned() } else { parts.join(", ") }
 }

@@ -220,22 +220,22 @@ impl Input {
                     axis: None,
                 })
             }
-            Source::BuiltIn { id, resolution } => Self::generate(source, id, *resolution),
+            Source::BuiltIn { id, resolution } => {
+                let (shape, resolution) = built_in(id, *resolution)?;
+                let mesh = shape.mesh(resolution);
+                let report = surface::validate(&mesh)?;
+                let axis = shape.axis().map(|axis| axis.mesh);
+                let coordinates = mesh.vertices.iter().flat_map(|v| v.to_array());
+                let indices = mesh.faces.iter().flatten().flat_map(|i| i.to_le_bytes());
+                // Records hold distances to the known axis: a corrected axis is another input.
+                let spheres = axis.iter().flat_map(|axis| &axis.spheres);
+                let known = spheres.flat_map(|s| [s.centre.x, s.centre.y, s.centre.z, s.radius]);
+                let bytes = coordinates.flat_map(f64::to_le_bytes).chain(indices);
+                let bytes: Vec<u8> = bytes.chain(known.flat_map(f64::to_le_bytes)).collect();
+                let hash = hex_digest(&bytes);
+                Ok(Self { name: source.name(), hash, mesh, report, axis })
+            }
         }
-    }
-
-    fn generate(source: &Source, id: &str, resolution: Option<u32>) -> Result<Self, InputError> {
-        let (shape, resolution) = built_in(id, resolution)?;
-        let mesh = shape.mesh(resolution);
-        let report = surface::validate(&mesh)?;
-        let axis = shape.axis().map(|axis| axis.mesh);
-        // Records hold distances to the known axis: a corrected axis is another input.
-        let mut bytes = surface_bytes(&mesh);
-        let spheres = axis.iter().flat_map(|axis| &axis.spheres);
-        for number in spheres.flat_map(|s| [s.centre.x, s.centre.y, s.centre.z, s.radius]) {
-            bytes.extend(number.to_le_bytes());
-        }
-        Ok(Self { name: source.name(), hash: hex_digest(&bytes), mesh, report, axis })
     }
 
     /// The normalised shape, without substrates.
@@ -294,11 +294,4 @@ fn estimated_vertices(shape: &BuiltIn, resolution: u32) -> f64 {
 fn meant_shape(path: &Path) -> String {
     let id = path.file_name().and_then(|name| medial_datasets::find(name.to_str()?));
     id.map_or(String::new(), |shape| format!("; the built-in shape is `builtin:{}`", shape.id))
-}
-
-/// Coordinates and faces in their order, after reading.
-fn surface_bytes(mesh: &TriMesh) -> Vec<u8> {
-    let coordinates = mesh.vertices.iter().flat_map(|v| v.to_array());
-    let indices = mesh.faces.iter().flatten();
-    coordinates.flat_map(f64::to_le_bytes).chain(indices.flat_map(|i| i.to_le_bytes())).collect()
 }

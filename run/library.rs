@@ -3,7 +3,7 @@
 //! `scripts/fetch_meshes.py` fills the folder. A file is identified only by the hash of its content.
 
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::{env, fs, io};
 
 use etcetera::BaseStrategy;
@@ -31,7 +31,8 @@ pub struct Cached {
 /// Published meshes, and the folder of their files.
 #[derive(Clone, Debug)]
 pub struct Library {
-    folder: PathBuf,
+    /// The folder.
+    pub folder: PathBuf,
     /// The catalogue of published meshes.
     pub catalogue: Cow<'static, Catalogue>,
 }
@@ -88,11 +89,6 @@ impl Library {
             None => Cow::Borrowed(published()),
         };
         Ok(Self { folder, catalogue })
-    }
-
-    /// The folder.
-    pub fn folder(&self) -> &Path {
-        &self.folder
     }
 
     /// The path of a mesh of the catalogue, whether it exists or not.

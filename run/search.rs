@@ -20,11 +20,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::text::significant;
 use medial::complex::MedialMesh;
 use medial::simplifier::{Level, Simplification, SimplifyError};
 
 use crate::hash::mesh_hash;
+use crate::text::percent;
 
 /// Counts of the sweep for a method that computes them in one run, and for others.
 const COUNTS: [usize; 2] = [40, 24];
@@ -315,7 +315,6 @@ impl<'a> Search<'a> {
 impl Found {
     /// The message for a bound that no level meets.
     pub fn refusal(&self, bound: f64) -> String {
-        let percent = |fraction: f64| format!("{} %", significant(100.0 * fraction, 3));
         let best = self.best.map_or_else(String::new, |Probe { level, spheres, error }| {
             let count = match level {
                 Level::Spheres(requested) if requested == spheres => String::new(),

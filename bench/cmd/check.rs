@@ -43,7 +43,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let interrupted = interrupt::listen();
     // A case has no record and needs no provenance.
     let mut supervisor =
-        Supervisor::new(registry.files(), &Provenance::default(), None, interrupted);
+        Supervisor::new(&registry.files, &Provenance::default(), None, interrupted);
     let (mut counts, mut list) = ([0; 3], Vec::new());
     for (item, case) in &items {
         let begun = Instant::now();
@@ -128,7 +128,7 @@ impl Arguments {
                     id: id.to_owned(),
                     name: None,
                     params: params.clone(),
-                    fingerprint: entry.fingerprint().map(str::to_owned),
+                    fingerprint: entry.fingerprint.clone(),
                 };
                 let threads = rayon::current_num_threads();
                 let limits = study.limits(&here);

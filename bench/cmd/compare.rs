@@ -133,9 +133,9 @@ pub fn run(
         items = shard(text, &items)?;
     }
     let axes = Some(arguments.out.join(AXES));
-    let store = Store::open(&arguments.out, RESULTS, &provenance.command)?;
+    let store = Store::open(&arguments.out, &provenance.command)?;
     let interrupted = interrupt::listen();
-    let supervisor = || Supervisor::new(registry.files(), &provenance, axes.clone(), interrupted);
+    let supervisor = || Supervisor::new(&registry.files, &provenance, axes.clone(), interrupted);
     let supervisors = (0..study.jobs).map(|_| supervisor()).collect();
     store.remarks.iter().for_each(|remark| note(global, remark));
     let mut side = Contender { supervisors, store };
@@ -149,7 +149,7 @@ pub fn run(
     }
     // No result is touched before this line.
     if arguments.fresh {
-        side.store.clear(RESULTS)?;
+        side.store.clear()?;
     }
     let earlier = Study::read(&arguments.out.join(STUDY)).ok();
     let turns = earlier.is_some_and(|earlier| earlier.against != study.against);

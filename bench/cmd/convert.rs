@@ -58,7 +58,9 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
             "{from}: a surface has no colours; name a medial mesh"
         )));
     // A medial mesh of a surface is computed, not converted.
-    } else if is_only_medial(&extension(&arguments.to)) {
+    } else if complex::WRITABLE.contains(&&*extension(&arguments.to))
+        && !SURFACES.contains(&&*extension(&arguments.to))
+    {
         if !["builtin:", "dataset:"].iter().any(|known| from.to_string_lossy().starts_with(known)) {
             open_regular(from)?;
         }
@@ -83,11 +85,6 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         [(vertices, "vertex"), (faces, "face")].map(|(count, noun)| counted(count as u64, noun));
     let text = format!("{}: {vertices}, {faces}", arguments.to.display());
     Ok(print_result(global, &object, &text, &notes))
-}
-
-/// Whether an extension is written for medial meshes and not for surfaces.
-fn is_only_medial(extension: &str) -> bool {
-    complex::WRITABLE.contains(&extension) && !SURFACES.contains(&extension)
 }
 
 /// Options of formats for viewers.

@@ -104,7 +104,7 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
     let script = scratch.path().join("fetch_meshes.py");
     fs::write(&script, SCRIPT).map_err(failed)?;
     let mut command = Command::new("python3");
-    command.arg(&script).args(&arguments.names).arg("--cache").arg(library.folder());
+    command.arg(&script).args(&arguments.names).arg("--cache").arg(&library.folder);
     command.arg("--timeout").arg(arguments.timeout.to_string());
     // The script reads the variable itself, and has no embedded catalogue.
     if env::var_os("MEDIAL_CATALOGUE").is_none_or(|value| value.is_empty()) {
@@ -137,7 +137,7 @@ fn fetch_meshes(arguments: &Fetch, global: &Global) -> Result<Exit, Failure> {
             "{} of {} meshes stored in {}, {} new",
             report["verified"],
             report["wanted"],
-            library.folder().display(),
+            library.folder.display(),
             report["fetched"].as_array().map_or(0, Vec::len)
         ));
     }
@@ -161,7 +161,7 @@ fn list_all(global: &Global) -> Result<Exit, Failure> {
         });
         let object = json!({
             "datasets": datasets.collect::<Vec<_>>(),
-            "published": published, "cache": library.folder(),
+            "published": published, "cache": library.folder,
         });
         print_json(&object, &[]);
         return Ok(Exit::Done);

@@ -114,18 +114,18 @@ fn alternate(
     let items = study.items(registry, &here)?;
     let folders = ["old", "new"].map(|side| arguments.out.join(side));
     let entries: Vec<_> = listed(&arguments.out).collect();
-    claim(&arguments.out, is_store(&folders[0], RESULTS), &entries)?;
+    claim(&arguments.out, is_store(&folders[0]), &entries)?;
     // Before the process listens for interrupts: another program may never end.
     let builds = [&arguments.old, &arguments.new].map(|program| Build::of(program));
     let interrupted = interrupt::listen();
     let mut sides = Vec::new();
     for (build, folder) in builds.into_iter().zip(folders) {
         let build = build.map_err(Failure::input)?;
-        let store = Store::open(&folder, RESULTS, &here.command)?;
+        let store = Store::open(&folder, &here.command)?;
         store.remarks.iter().for_each(|remark| note(global, remark));
         let axes = Some(folder.join(AXES));
-        let supervisor = Supervisor::new(registry.files(), &build.provenance, axes, interrupted);
-        let supervisor = supervisor.of_program(&build.program);
+        let mut supervisor = Supervisor::new(&registry.files, &build.provenance, axes, interrupted);
+        supervisor.program = Some(build.program);
         sides.push(Contender { supervisors: vec![supervisor], store });
     }
     let mut left = items.clone();

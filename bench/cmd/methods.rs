@@ -18,7 +18,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
     let entries: Vec<&Entry> = match &arguments.id {
         Some(id) => vec![method(registry, id)?],
-        None => registry.entries().iter().collect(),
+        None => registry.entries.iter().collect(),
     };
     if global.json {
         print_json(&json!({ "methods": entries }), &[]);
@@ -27,7 +27,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     } else {
         let width = entries.iter().map(|entry| entry.id().len()).max().unwrap_or_default();
         for entry in entries {
-            let note = if entry.presentation().on_request { " (runs only when named)" } else { "" };
+            let note = if entry.presentation.on_request { " (runs only when named)" } else { "" };
             let info = entry.method().info();
             print_line(&format!("{:<width$} {}{note}", info.id, info.title));
             print_line(&format!("{:<width$} {}", "", info.summary));
@@ -37,7 +37,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
 }
 
 fn describe(entry: &Entry) {
-    let (info, best_for) = (entry.method().info(), &entry.presentation().best_for);
+    let (info, best_for) = (entry.method().info(), &entry.presentation.best_for);
     print_line(&format!("{}: {}", info.id, info.title));
     print_line(&format!("  {}", info.summary));
     if !best_for.is_empty() {

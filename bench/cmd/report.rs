@@ -51,7 +51,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     // The site of a store leaves the store unchanged, which may be read-only.
     let is_read = arguments.site.is_some() && arguments.out.is_none();
     // While another process adds records, a page would be outdated at once.
-    let held = (dir.is_dir() && !is_read).then(|| Store::open(dir, RESULTS, "medial report"));
+    let held = (dir.is_dir() && !is_read).then(|| Store::open(dir, "medial report"));
     let held = held.transpose()?;
     if is_read {
         // The pages would show the file behind a link.
@@ -139,7 +139,7 @@ fn merge(dirs: &[PathBuf], out: &Path) -> Result<Vec<String>, Failure> {
         }
     }
     // After all stores were read: a wrong folder must not leave an empty store.
-    let store = Store::open(out, RESULTS, "medial report")?;
+    let store = Store::open(out, "medial report")?;
     for (record, dir, _) in merged.iter().filter(|(_, dir, _)| dir.as_path() != out) {
         let Some(artifact) = record.artifact.as_deref() else { continue };
         // Names contain the key: the same name in two stores is the same result.

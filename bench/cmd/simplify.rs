@@ -89,7 +89,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let request = Request {
         shape: &shape,
         method: entry.method(),
-        sweep: &entry.presentation().sweep,
+        sweep: &entry.presentation.sweep,
         params: &params,
         context: &RunContext::with_seed(seed).on_progress(line.steps()),
         judge: arguments.measure.judge_options(seed),

@@ -37,7 +37,7 @@ use crate::process_tree::ending_signal;
 /// Runs items one after another, in a worker that it replaces when an item has broken it.
 pub struct Supervisor<'a> {
     /// The program of the workers; `None` for the running one.
-    program: Option<PathBuf>,
+    pub program: Option<PathBuf>,
     plugins: Vec<PathBuf>,
     provenance: Provenance,
     axes: Option<PathBuf>,
@@ -91,11 +91,6 @@ impl<'a> Supervisor<'a> {
         // Two builds are compared as a whole: the method versions of another program are unknown.
         let binary = self.provenance.binary_hash.clone();
         Item { version: binary.clone(), binary, ..item.clone() }
-    }
-
-    /// The same with workers of another build of the program.
-    pub fn of_program(self, program: &Path) -> Self {
-        Self { program: Some(program.to_owned()), ..self }
     }
 
     /// Ends the worker: the next item gets a new process.

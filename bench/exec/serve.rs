@@ -157,7 +157,7 @@ fn run(
     let search = Bounds {
         shape: scene.shape(),
         info,
-        sweep: entry.as_ref().map_or(&[], |entry| &entry.presentation().sweep),
+        sweep: entry.as_ref().map_or(&[], |entry| &entry.presentation.sweep),
         prepare: &prepare,
         measure: &measure,
         budget: &budget,
@@ -234,7 +234,7 @@ fn run_case(registry: &Registry, item: &CheckItem) -> io::Result<()> {
                 method: entry.method(),
                 params: &item.method.params,
                 seed: 0,
-                external: entry.fingerprint().is_some(),
+                external: entry.fingerprint.is_some(),
                 // The supervisor notices by itself when the pipe is closed.
                 doing: &|what| drop(send(&Event::Doing(what.to_owned()))),
             };
@@ -252,7 +252,7 @@ fn find<'r>(registry: &'r Registry, method: &MethodSpec) -> Result<&'r Entry, St
     let now = if id == GIVEN {
         crate::study::external::fingerprint(&method.params)
     } else {
-        entry.fingerprint().map(str::to_owned)
+        entry.fingerprint.clone()
     };
     if now != method.fingerprint {
         let what = if id == GIVEN { "its file" } else { "its plug-in file or program" };

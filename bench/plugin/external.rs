@@ -38,18 +38,14 @@ pub const SCRATCH: &str = "MEDIAL_SCRATCH";
 #[derive(Debug)]
 pub struct External {
     declaration: Arc<Declaration>,
-    fingerprint: String,
+    /// SHA-256 over the declaration and its files: an edited script is a new version.
+    pub fingerprint: String,
 }
 
 impl External {
     pub(super) fn new(declaration: Declaration) -> io::Result<Self> {
         let fingerprint = fingerprint(&declaration)?;
         Ok(Self { declaration: Arc::new(declaration), fingerprint })
-    }
-
-    /// SHA-256 over the declaration and its files: an edited script is a new version.
-    pub fn fingerprint(&self) -> &str {
-        &self.fingerprint
     }
 
     /// A warning about files that the command names inside of a word, such as `--in=in.ma` or a script in a shell

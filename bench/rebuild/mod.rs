@@ -172,8 +172,8 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
     // External results have notes of their own.
     let ids = ids.into_iter().filter(|&id| id != GIVEN);
     let recorded = ids.filter_map(|id| registry.entry(id));
-    for entry in registry.entries().iter().chain(recorded) {
-        let note = MethodNote::new(entry.method().info(), entry.presentation());
+    for entry in registry.entries.iter().chain(recorded) {
+        let note = MethodNote::new(entry.method().info(), &entry.presentation);
         match header.methods.iter_mut().find(|known| known.id == entry.id()) {
             Some(known) => *known = note,
             None => header.methods.push(note),
@@ -186,7 +186,7 @@ fn header(dir: &Path, records: &[Record], registry: &Registry, warnings: &[Strin
     }
     // In the order of the tables.
     header.methods.sort_by_key(|method| {
-        let place = registry.entries().iter().position(|entry| entry.id() == method.id);
+        let place = registry.entries.iter().position(|entry| entry.id() == method.id);
         place.unwrap_or(usize::MAX)
     });
     header

@@ -416,14 +416,14 @@ impl Study {
                 settings: self.settings(),
             };
             let noisy = self.noise.iter().map(|&eta| {
-                let mesh = noisy(&scene.mesh, eta);
+                let mesh = format!("{} noise {eta}", scene.mesh);
                 let noise = Some(Noise { eta, seed: self.seed });
                 SceneSpec { mesh, noise, ..scene.clone() }
             });
             for scene in std::iter::once(scene.clone()).chain(noisy) {
                 for (method, entry) in &methods {
                     let StudyMethod { id, name, params, .. } = method.clone();
-                    let fingerprint = entry.fingerprint().map(str::to_owned);
+                    let fingerprint = entry.fingerprint.clone();
                     let spec = MethodSpec { id, name, params, fingerprint };
                     let (levels, version) =
                         (self.levels(method, entry), entry.version(&here.binary_hash));
@@ -503,7 +503,7 @@ impl Study {
         counts.dedup();
         levels.extend(counts.into_iter().map(Target::Spheres));
         let mut native = match method.levels.is_empty() && !self.counts_only {
-            true => entry.presentation().sweep.clone(),
+            true => entry.presentation.sweep.clone(),
             false => method.levels.clone(),
         };
         native.sort_by(f64::total_cmp);
@@ -552,11 +552,6 @@ pub fn shard(text: &str, items: &[Item]) -> Result<Vec<Item>, Failure> {
         }
     }
     Ok(own)
-}
-
-/// The name of a mesh with noise.
-fn noisy(mesh: &str, eta: f64) -> String {
-    format!("{mesh} noise {eta}")
 }
 
 /// Names that differ in case alone are one file on some systems.

@@ -21,13 +21,14 @@ const RUNNER: u32 = 1;
 
 /// Methods by id, in the order of the tables.
 pub struct Registry {
-    entries: Vec<Entry>,
+    /// All methods, without the initial medial mesh and external results.
+    pub entries: Vec<Entry>,
     /// Entries that can be run but are not methods: the initial medial mesh and external results.
     others: [Entry; 2],
     /// The plug-in files that were added, as absolute paths.
-    files: Vec<PathBuf>,
+    pub files: Vec<PathBuf>,
     /// Loader of plug-in files in the host's language.
-    loader: Option<Box<dyn ScriptLoader>>,
+    pub loader: Option<Box<dyn ScriptLoader>>,
     /// Remarks on plug-ins, for the user.
     pub remarks: Vec<String>,
 }
@@ -35,8 +36,11 @@ pub struct Registry {
 /// A method, its presentation, and for a plug-in a hash of its files.
 pub struct Entry {
     method: Arc<dyn MedialSimplifier>,
-    presentation: Presentation,
-    fingerprint: Option<String>,
+    /// How it is presented.
+    pub presentation: Presentation,
+    /// Hash of the declaration and the files of a plug-in; `None` for a method of the program, which
+    /// the program's own hash covers.
+    pub fingerprint: Option<String>,
     /// See [`Registered::version`].
     version: Option<String>,
 }
@@ -60,11 +64,6 @@ impl Entry {
     /// The method.
     pub fn method(&self) -> &dyn MedialSimplifier {
         self.method.as_ref()
-    }
-
-    /// How it is presented.
-    pub fn presentation(&self) -> &Presentation {
-        &self.presentation
     }
 
     fn new(registered: Registered, fingerprint: Option<String>) -> Self {
@@ -92,12 +91,6 @@ impl Entry {
     pub fn id(&self) -> &str {
         &self.method.info().id
     }
-
-    /// Hash of the declaration and the files of a plug-in; `None` for a method of the program, which
-    /// the program's own hash covers.
-    pub fn fingerprint(&self) -> Option<&str> {
-        self.fingerprint.as_deref()
-    }
 }
 
 impl Registry {
@@ -122,12 +115,6 @@ impl Registry {
         Ok(registry)
     }
 
-    /// The same with a loader for plug-in files of its language.
-    #[must_use]
-    pub fn with_loader(self, loader: Box<dyn ScriptLoader>) -> Self {
-        Self { loader: Some(loader), ..self }
-    }
-
     /// Adds the methods of a plug-in file.
     ///
     /// # Errors
@@ -147,7 +134,7 @@ impl Registry {
             (plugin::load(&file, &taken)?.into_iter())
                 .map(|external| {
                     self.remarks.extend(external.remark());
-                    let fingerprint = Some(external.fingerprint().to_owned());
+                    let fingerprint = Some(external.fingerprint.clone());
                     Entry::new(external.into(), fingerprint)
                 })
                 .collect()
@@ -168,18 +155,8 @@ impl Registry {
         super::no_such_method(id, &known)
     }
 
-    /// All methods, without the initial medial mesh and external results.
-    pub fn entries(&self) -> &[Entry] {
-        &self.entries
-    }
-
     /// The methods that run by default: all but those on request.
     pub fn usual(&self) -> impl Iterator<Item = &Entry> {
         self.entries.iter().filter(|entry| !entry.presentation.on_request)
-    }
-
-    /// The plug-in files that were added.
-    pub fn files(&self) -> &[PathBuf] {
-        &self.files
     }
 }

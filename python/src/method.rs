@@ -42,7 +42,7 @@ fn registry() -> &'static Registry {
 /// The descriptions of the methods of the program, as JSON.
 #[pyfunction]
 pub fn methods() -> PyResult<String> {
-    Ok(serde_json::to_string(registry().entries())
+    Ok(serde_json::to_string(&registry().entries)
         .map_err(|error| Failure::new(Kind::Internal, error))?)
 }
 
@@ -61,7 +61,7 @@ impl Method {
             return Ok(Self::Class(Box::new(ClassMethod::new(name)?)));
         };
         let known =
-            || registry().entries().iter().map(|entry| entry.id().to_owned()).collect::<Vec<_>>();
+            || registry().entries.iter().map(|entry| entry.id().to_owned()).collect::<Vec<_>>();
         match registry().entry(&id) {
             Some(entry) => Ok(Self::BuiltIn(entry)),
             None => Err(Failure::parameter(no_such_method(&id, &known())).into()),
@@ -79,7 +79,7 @@ impl Method {
     /// Native levels of a default comparison.
     pub fn sweep(&self) -> &[f64] {
         match self {
-            Self::BuiltIn(entry) => &entry.presentation().sweep,
+            Self::BuiltIn(entry) => &entry.presentation.sweep,
             Self::Class(method) => &method.presentation.sweep,
         }
     }

@@ -146,11 +146,6 @@ impl Diff {
         let methods: BTreeSet<&str> = timings.map(|timing| timing.method.as_str()).collect();
         items(self.changes.iter().filter(of)).len() + methods.len()
     }
-
-    /// The difference as Markdown, for a pull request.
-    pub fn to_markdown(&self) -> String {
-        text::markdown(self)
-    }
 }
 
 /// Number of meshes of each method.

@@ -16,34 +16,33 @@ const MOST_ROWS: usize = 40;
 /// Names of missing results in a sentence.
 const MOST_NAMES: usize = 5;
 
-pub(super) fn markdown(diff: &Diff) -> String {
-    let mut text = format!("{}\n\n{}\n\n", heading(diff), sides(diff));
-    for (meaning, caption) in [
-        (Meaning::Regression, "Worse"),
-        (Meaning::Improvement, "Better"),
-        (Meaning::Changed, "Changed otherwise"),
-    ] {
-        let changes: Vec<&Change> =
-            diff.changes.iter().filter(|change| change.meaning == meaning).collect();
-        if !changes.is_empty() {
-            text.push_str(&to_markdown(&change_table(caption, &changes)));
-            text.push('\n');
+impl Diff {
+    /// The difference as Markdown, for a pull request.
+    pub fn to_markdown(&self) -> String {
+        let mut text = format!("{}\n\n{}\n\n", heading(self), sides(self));
+        for (meaning, caption) in [
+            (Meaning::Regression, "Worse"),
+            (Meaning::Improvement, "Better"),
+            (Meaning::Changed, "Changed otherwise"),
+        ] {
+            let changes: Vec<&Change> =
+                self.changes.iter().filter(|change| change.meaning == meaning).collect();
+            if !changes.is_empty() {
+                text += &format!("{}\n", to_markdown(&change_table(caption, &changes)));
+            }
         }
-    }
-    if !diff.timings.is_empty() {
-        text.push_str(&to_markdown(&timing_table(diff)));
-        text.push('\n');
-    }
-    for why in &diff.untimed {
-        text.push_str(&format!("Not compared: {}.\n\n", escape(why)));
-    }
-    for (names, what) in [(&diff.missing, "only in the older"), (&diff.added, "only in the newer")]
-    {
-        if !names.is_empty() {
-            text.push_str(&format!("{}: {}.\n\n", results(names.len(), what), listed(names)));
+        if !self.timings.is_empty() {
+            text += &format!("{}\n", to_markdown(&timing_table(self)));
         }
+        for why in &self.untimed {
+            text += &format!("Not compared: {}.\n\n", escape(why));
+        }
+        let only = [(&self.missing, "only in the older"), (&self.added, "only in the newer")];
+        for (names, what) in only.into_iter().filter(|(names, _)| !names.is_empty()) {
+            text += &format!("{}: {}.\n\n", results(names.len(), what), listed(names));
+        }
+        text + &unlike(&self.unlike)
     }
-    text + &unlike(&diff.unlike)
 }
 
 fn heading(diff: &Diff) -> String {

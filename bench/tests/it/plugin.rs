@@ -336,7 +336,7 @@ fn temporary_files_are_in_the_scratch_folder_and_removed() {
 fn a_changed_script_or_declaration_has_another_fingerprint() {
     let toml = entry(r#"["sh", "run.sh", "{output}", "{spheres}"]"#, r#"["spheres"]"#, "");
     let (folder, path) = written(&toml, &[("run.sh", VALID)]);
-    let fingerprint = || plugin::load(&path, &[]).expect("a plug-in")[0].fingerprint().to_owned();
+    let fingerprint = || plugin::load(&path, &[]).expect("a plug-in")[0].fingerprint.clone();
     let first = fingerprint();
     assert!(first.len() == 64 && first == fingerprint());
     fs::write(folder.path().join("run.sh"), format!("{VALID}#")).expect("written");
@@ -350,7 +350,7 @@ fn a_changed_script_or_declaration_has_another_fingerprint() {
     let of = |toml: &str| {
         fs::write(&path, toml).expect("written");
         let method = plugin::load(&path, &[]).expect("a plug-in").remove(0);
-        (method.fingerprint().to_owned(), method.remark())
+        (method.fingerprint.clone(), method.remark())
     };
     let before = [of(&inside), of(&listed)];
     fs::write(folder.path().join("run.sh"), VALID).expect("written");
@@ -358,7 +358,7 @@ fn a_changed_script_or_declaration_has_another_fingerprint() {
     assert!(before[0].1.as_ref().is_some_and(|remark| remark.contains("./run.sh, run.sh")));
     // The same files in another folder are the same plug-in.
     let (_elsewhere, path) = written(&toml, &[("run.sh", VALID)]);
-    assert_eq!(plugin::load(&path, &[]).expect("a plug-in")[0].fingerprint(), first);
+    assert_eq!(plugin::load(&path, &[]).expect("a plug-in")[0].fingerprint, first);
 }
 
 /// A wrong declaration is refused with its line and the reason.
