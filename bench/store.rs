@@ -125,7 +125,7 @@ impl Store {
 
 /// Whether the level of a record has to be run again.
 fn is_incomplete(record: &Record, item: &Item, retry_failed: bool) -> bool {
-    let limits = record.conditions.clone().unwrap_or_default();
+    let limits = &record.conditions;
     match record.status {
         // A finished result is the same under any limit; an interrupted one may finish under a larger limit.
         Status::TimedOut if item.limits.seconds > limits.seconds_limit => true,

@@ -382,7 +382,7 @@ impl<'a> SeriesKey<'a> {
         let params: Vec<String> = (params.iter())
             .map(|(key, value)| format!("{key}={}", value.trim_matches('"')))
             .collect();
-        let conditions = record.conditions.as_ref();
+        let conditions = &record.conditions;
         // The files of one external method are one row for all paths and hashes.
         let is_external = record.status == Status::External;
         Self {
@@ -396,10 +396,10 @@ impl<'a> SeriesKey<'a> {
                 "" => &record.binary_hash,
                 version => version,
             },
-            plugin: conditions.filter(|_| !is_external).and_then(|c| c.fingerprint.as_deref()),
-            sampling: conditions.map_or("", |c| &c.sampling),
-            dual: conditions.map_or("", |c| &c.dual),
-            samples: conditions.map_or(0, |c| c.samples),
+            plugin: conditions.fingerprint.as_deref().filter(|_| !is_external),
+            sampling: &conditions.sampling,
+            dual: &conditions.dual,
+            samples: conditions.samples,
             threads: simplify.threads,
             edition: record.edition.as_deref(),
             is_other_version: record.is_other_version,

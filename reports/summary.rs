@@ -194,7 +194,6 @@ fn at_count(
         reached.retain(|entry| entry.comparable()); // of all meshes, not of the own set
         let mut without = BTreeMap::new();
         for entry in entries.iter().filter(|entry| !entry.comparable()) {
-            // Also for records of older builds, which lack this status.
             let status = entry.record.status;
             let status = if status.is_ok() { Status::OtherCount } else { status };
             *without.entry(status).or_default() += 1;

@@ -40,7 +40,7 @@ pub fn failure_record(
         status: *status,
         reason: Some(reason.clone()),
         simplify,
-        conditions: Some(Conditions {
+        conditions: Conditions {
             sampling: scene.settings.sampling.to_string(),
             dual: scene.settings.dual.to_string(),
             samples: scene.settings.samples,
@@ -49,7 +49,7 @@ pub fn failure_record(
             budget: item.limits.budget,
             jobs: 1,
             fingerprint: item.method.fingerprint.clone(),
-        }),
+        },
         seeds: seeds.map(|(purpose, seed)| (purpose.to_owned(), seed)).into(),
         machine: provenance.machine.clone(),
         method_version: item.version.clone(),

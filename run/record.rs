@@ -106,7 +106,7 @@ impl fmt::Display for Status {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// Key of the level of the item: records with the same key are of the same work, and the last
-    /// one counts. Empty in records of older builds.
+    /// one counts. Empty in the records of an edition.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub key: String,
     /// Name of the mesh, as the user or the catalogue calls it.
@@ -132,31 +132,24 @@ pub struct Record {
     /// The medial mesh that every simplifier of this shape starts from.
     pub initial: Option<Initial>,
     /// Settings of the run except input, method and level.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub conditions: Option<Conditions>,
+    pub conditions: Conditions,
     /// SHA-256 of the resulting medial mesh; the same for equal results.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub result_hash: Option<String>,
     /// Every seed by its purpose, such as `sampling`, `method`, `evaluation`.
-    #[serde(default)]
     pub seeds: BTreeMap<String, u64>,
     /// Every timed repetition, raw, in the order they ran. [`Simplify::seconds`] is their summary.
-    #[serde(default)]
     pub repetitions: Vec<Repetition>,
     /// The machine.
-    #[serde(default)]
     pub machine: Machine,
-    /// Version of the method, a hash of its sources; empty in records of older builds.
+    /// Version of the method, a hash of its sources; empty for a method without one.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub method_version: String,
     /// Hash of the program that ran the method.
-    #[serde(default)]
     pub binary_hash: String,
     /// The command line, as the user typed it.
-    #[serde(default)]
     pub command: String,
     /// Version of the program.
-    #[serde(default)]
     pub version: String,
     /// Path of the resulting `.ma` file relative to the folder of the results, with `/`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -178,7 +171,7 @@ impl Record {
 
     /// Whether no other item of the run disturbed the seconds: only such seconds are comparable.
     pub fn ran_alone(&self) -> bool {
-        self.conditions.as_ref().is_none_or(|conditions| conditions.jobs <= 1)
+        self.conditions.jobs <= 1
     }
 
     /// Wall-clock seconds by stage, of a run that nothing disturbed. Those of an edition are of another run, on another
@@ -206,10 +199,8 @@ pub struct Simplify {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variant: Option<String>,
     /// Parameters that the user set; an empty object means the paper's values.
-    #[serde(default)]
     pub params: Params,
     /// Seed of the method's random choices.
-    #[serde(default)]
     pub seed: u64,
     /// The requested level.
     pub level: Target,
@@ -224,7 +215,6 @@ pub struct Simplify {
     /// Faces of the result.
     pub faces: Option<usize>,
     /// Wall-clock seconds of each shared substrate that the method used, even if another method built it.
-    #[serde(default)]
     pub substrates: BTreeMap<String, f64>,
     /// Wall-clock seconds by stage.
     pub seconds: Option<Stages>,
@@ -242,10 +232,8 @@ pub struct Simplify {
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub diagnostics: BTreeMap<String, u64>,
     /// Warnings, one sentence each.
-    #[serde(default)]
     pub warnings: Vec<String>,
     /// Version of the program.
-    #[serde(default)]
     pub version: String,
 }
 
@@ -283,16 +271,10 @@ pub struct Conditions {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub budget: Option<f64>,
     /// Number of items that ran at the same time.
-    #[serde(default = "one_job")]
     pub jobs: usize,
     /// Hash of the declaration and the files of a plug-in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fingerprint: Option<String>,
-}
-
-/// Records of older builds ran alone.
-fn one_job() -> usize {
-    1
 }
 
 /// Seconds by stage.

@@ -164,7 +164,7 @@ impl Desk<'_> {
                         record.simplify.cpu_seconds =
                             median(&record.repetitions, |r| r.cpu_seconds);
                     }
-                    record.conditions.iter_mut().for_each(|conditions| conditions.jobs = self.jobs);
+                    record.conditions.jobs = self.jobs;
                 }
                 store.append(&records)?;
             }

@@ -116,8 +116,7 @@ impl Edition {
         let mut records = read_records(&folder.join(RESULTS))?.records;
         let Some(last) = records.last() else { return Err(Failure::at(folder, "no record")) };
         let settings = |record: &Record| {
-            let Conditions { sampling, dual, samples, .. } =
-                record.conditions.clone().unwrap_or_default();
+            let Conditions { sampling, dual, samples, .. } = record.conditions.clone();
             (sampling, dual, samples, record.seeds.get("evaluation").copied().unwrap_or_default())
         };
         let of_all = settings(last);

@@ -94,7 +94,7 @@ fn other_mesh(old: &Record, new: &Record) -> Option<String> {
 }
 
 fn settings(record: &Record) -> Settings {
-    let conditions = record.conditions.clone().unwrap_or_default();
+    let conditions = record.conditions.clone();
     let threads = record.simplify.threads;
     [
         ("sampling", conditions.sampling),

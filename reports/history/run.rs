@@ -233,8 +233,7 @@ fn machine(machine: &Machine) -> String {
 }
 
 fn conditions(record: &Record) -> String {
-    // Old records have none.
-    let conditions = record.conditions.clone().unwrap_or_default();
+    let conditions = &record.conditions;
     let seeds: Vec<String> = record.seeds.iter().map(|(of, seed)| format!("{of} {seed}")).collect();
     let threads = record.simplify.threads.map_or("unknown".to_owned(), |n| n.to_string());
     printable(&format!(

@@ -66,8 +66,7 @@ fn disturbed_seconds_are_excluded_from_tables() {
     let alone = comparison(&SHAPES[..2], &METHODS, &COUNTS);
     let mut disturbed = alone.clone();
     for record in &mut disturbed {
-        let conditions = record.conditions.get_or_insert_default();
-        conditions.jobs = 2;
+        record.conditions.jobs = 2;
     }
     let seconds = |records: &[Record]| -> Vec<String> {
         let files = report_of(records);
