@@ -45,10 +45,8 @@ pub(crate) struct SeriesSummary {
     pub(crate) requested: usize,
     /// Meshes without such a result, by status.
     pub(crate) without: BTreeMap<Status, usize>,
-    /// Means of the columns by their keys, and the number of meshes that each is over.
-    means: BTreeMap<&'static str, (f64, usize)>,
-    /// 95 % intervals of the means of errors over meshes, by the keys of their columns.
-    intervals: BTreeMap<&'static str, [f64; 2]>,
+    /// Means of the columns by their keys, the number of meshes that each is over, and for errors the 95 % interval.
+    means: BTreeMap<&'static str, (f64, usize, Option<[f64; 2]>)>,
     /// Hausdorff error in relation to the reference's.
     pub(crate) ratio: Option<Ratio>,
     /// Results with the Betti numbers of the solid, of those where both are known; over all meshes
@@ -59,17 +57,17 @@ pub(crate) struct SeriesSummary {
 impl SeriesSummary {
     /// The mean of one of [`COMPARED`](crate::metric::COMPARED).
     pub(crate) fn mean(&self, metric: &Metric) -> Option<f64> {
-        self.means.get(metric.key).map(|(mean, _)| *mean)
+        self.means.get(metric.key).map(|(mean, ..)| *mean)
     }
 
     /// The 95 % interval of the mean of an error.
     pub(crate) fn interval(&self, metric: &Metric) -> Option<[f64; 2]> {
-        self.intervals.get(metric.key).copied()
+        self.means.get(metric.key)?.2
     }
 
     /// Meshes that the mean of a metric is over: a result without a triangle, for example, has no angle.
     pub(crate) fn over(&self, metric: &Metric) -> usize {
-        self.means.get(metric.key).map_or(0, |(_, over)| *over)
+        self.means.get(metric.key).map_or(0, |(_, over, _)| *over)
     }
 }
 
@@ -176,7 +174,7 @@ fn at_count(
         averaged.retain(|entry| {
             set.levels.contains(&level) && entry.comparable() && set.meshes.contains(&entry.mesh)
         });
-        let (mut means, mut intervals) = (BTreeMap::new(), BTreeMap::new());
+        let mut means = BTreeMap::new();
         // Two more for plots.
         for metric in comparison.columns().into_iter().chain([&COMPLETENESS, &LARGER_SIDE]) {
             let known = set.known(comparison, series, metric);
@@ -185,10 +183,9 @@ fn at_count(
             // A mean over less than half of the meshes would not represent the requested ones.
             let enough = 2 * values.len() >= entries.len();
             let mean = metric.mean.of(&values).filter(|_| enough);
-            means.extend(mean.map(|mean| (metric.key, (mean, values.len()))));
-            if [HAUSDORFF.key, MEAN_ERROR.key].contains(&metric.key) && enough {
-                intervals.extend(interval(&values).map(|ends| (metric.key, ends)));
-            }
+            let is_error = [HAUSDORFF.key, MEAN_ERROR.key].contains(&metric.key);
+            let ends = interval(&values).filter(|_| is_error);
+            means.extend(mean.map(|mean| (metric.key, (mean, values.len(), ends))));
         }
         let mut reached = entries.clone();
         reached.retain(|entry| entry.comparable()); // of all meshes, not of the own set
@@ -204,7 +201,6 @@ fn at_count(
             requested: entries.len(),
             without,
             means,
-            intervals,
             ratio: ratio(&entries, &yardstick),
             topology: topology(&reached),
         });

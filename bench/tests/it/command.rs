@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::thread;
+use std::time::Duration;
 
 use serde_json::Value;
 use tempfile::TempDir;
@@ -170,4 +172,22 @@ pub fn processes_with(text: &str) -> Vec<u32> {
         String::from_utf8_lossy(&line).replace('\0', " ").contains(text)
     };
     pids.filter(has).collect()
+}
+
+/// The id of a process that a file will hold.
+pub fn pid_in(path: &Path) -> u32 {
+    for _ in 0..6000 {
+        match fs::read_to_string(path) {
+            Ok(text) if text.ends_with('\n') => return text.trim().parse().expect("an id"),
+            _ => thread::sleep(Duration::from_millis(5)),
+        }
+    }
+    panic!("{} was not written", path.display());
+}
+
+/// Whether a process runs, by `/proc`.
+pub fn runs(pid: u32) -> bool {
+    let state = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    // A zombie of another parent is dead.
+    state.rsplit(')').next().is_some_and(|rest| !rest.trim().is_empty() && !rest.contains(" Z "))
 }

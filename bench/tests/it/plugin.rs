@@ -19,6 +19,8 @@ use medial_run::timed::ProgramPeak;
 use medial_test_support::skip;
 use tempfile::TempDir;
 
+use crate::command::{pid_in, runs};
+
 /// Writes a file of plug-ins into a new folder.
 fn written(toml: &str, files: &[(&str, &str)]) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
@@ -236,13 +238,6 @@ fn a_gigabyte_of_messages_is_read_in_little_memory() {
     assert!(after < before + 300_000_000, "{before} {after}");
 }
 
-/// Whether a process runs, by its number in a file.
-fn is_running(pid_file: &Path) -> bool {
-    let pid = fs::read_to_string(pid_file).expect("a number");
-    let stat = fs::read_to_string(format!("/proc/{}/stat", pid.trim())).unwrap_or_default();
-    stat.rsplit(')').next().is_some_and(|rest| !rest.is_empty() && !rest.starts_with(" Z"))
-}
-
 #[test]
 fn orphans_of_a_program_are_killed_and_reported() {
     if !Path::new("/proc/self/stat").exists() {
@@ -269,7 +264,7 @@ fn orphans_of_a_program_are_killed_and_reported() {
         assert!(start.elapsed() < Duration::from_secs(20), "{way}");
         let warnings = result.diagnostics.warnings.join("; ");
         assert!(warnings.contains("the program left running: 1"), "{way}: {warnings}");
-        assert!(!is_running(&folder.path().join("pid")), "{way}");
+        assert!(!runs(pid_in(&folder.path().join("pid"))), "{way}");
     }
 }
 
@@ -284,15 +279,13 @@ fn a_cancelled_program_ends_with_all_that_it_started() {
     let canceller = std::thread::spawn({
         let pid = pid.clone();
         move || {
-            while fs::read_to_string(&pid).map_or(true, |text| text.is_empty()) {
-                std::thread::sleep(Duration::from_millis(5));
-            }
+            pid_in(&pid);
             flag.store(true, Ordering::Relaxed);
         }
     });
     assert!(matches!(prepared.at(Level::Spheres(10)), Err(SimplifyError::Cancelled)));
     canceller.join().expect("cancelled");
-    assert!(!is_running(&pid));
+    assert!(!runs(pid_in(&pid)));
 }
 
 #[test]

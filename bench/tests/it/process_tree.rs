@@ -1,30 +1,12 @@
 //! Process trees: exactly the descendants of a child end with it.
 #![cfg(target_os = "linux")]
 
-use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::thread;
-use std::time::Duration;
 
 use medial_bench::process_tree::{Tree, descendants};
 
-/// Waits until a file holds a line.
-fn text_of(path: &Path) -> String {
-    for _ in 0..6000 {
-        match fs::read_to_string(path) {
-            Ok(text) if text.ends_with('\n') => return text.trim().to_owned(),
-            _ => thread::sleep(Duration::from_millis(5)),
-        }
-    }
-    panic!("{} was not written", path.display());
-}
-
-fn runs(pid: u32) -> bool {
-    let state = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-    // A zombie of another parent is dead.
-    state.rsplit(')').next().is_some_and(|rest| !rest.trim().is_empty() && !rest.contains(" Z "))
-}
+use crate::command::{pid_in, runs};
 
 fn shell(folder: &Path, script: &str) -> Child {
     let mut command = Command::new("sh");
@@ -35,7 +17,7 @@ fn shell(folder: &Path, script: &str) -> Child {
 #[test]
 fn a_tree_ends_as_a_whole_and_leaves_its_neighbours_alone() {
     let folder = tempfile::tempdir().expect("a folder");
-    let number = |name: &str| -> u32 { text_of(&folder.path().join(name)).parse().expect("a pid") };
+    let number = |name: &str| pid_in(&folder.path().join(name));
     let mut neighbour = shell(folder.path(), "exec sleep 1000");
     // Descendants of several generations, one of which leaves its session and its parent.
     let script = "sh -c 'sleep 1000 & echo $! > deep; wait' & \

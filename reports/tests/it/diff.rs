@@ -1,5 +1,6 @@
 //! The difference of two sets of records: regressions, listed changes, ignored noise.
 
+use medial::metrics::Evaluation;
 use medial_reports::diff::{Diff, Meaning};
 use medial_run::record::{Record, Repetition, Stages};
 
@@ -11,27 +12,34 @@ fn diff(old: &[Record], new: &[Record]) -> Diff {
     Diff::new(["before".into(), "after".into()], old, new, true)
 }
 
+/// Records with repetitions, from the record, its place and the number of the repetition: the shares of the wall-clock
+/// and the CPU seconds, and the further share of both without the substrates.
+fn repeated(repetitions: usize, shares: impl Fn(&Record, usize, usize) -> [f64; 3]) -> Vec<Record> {
+    let mut records = comparison(&SHAPES[..4], &METHODS, &[500, 100]);
+    for (place, record) in records.iter_mut().enumerate() {
+        let Some(Stages { substrate, prepare, simplify, .. }) = record.simplify.seconds else {
+            continue;
+        };
+        let lap = |k: usize| {
+            let [wall, cpu, own] = shares(record, place, k);
+            let [seconds, cpu_seconds] = [wall, cpu].map(|share| {
+                Stages::new(share * substrate, share * own * prepare, share * own * simplify)
+            });
+            Repetition { seconds, cpu_seconds }
+        };
+        record.repetitions = (0..repetitions).map(lap).collect();
+    }
+    records
+}
+
 /// Records with ten repetitions, each with a noise of some share of its seconds, on a machine whose load in the moment
 /// of a repetition slows all by up to a half.
 fn timed(seed: usize, noise: f64, factor: impl Fn(&Record) -> f64) -> Vec<Record> {
-    let mut records = comparison(&SHAPES[..4], &METHODS, &[500, 100]);
-    for (place, record) in records.iter_mut().enumerate() {
-        let Some(stages) = record.simplify.seconds else { continue };
-        let factor = factor(record);
-        let lap = |k: usize| {
-            let load = 1.25 + 0.25 * (2.0 * common::noise(k, 0, 0) - 1.0);
-            let random = 1.0 + noise * (2.0 * common::noise(seed, place, k + 77) - 1.0);
-            let all = load * random * factor;
-            let stages = Stages::new(
-                load * random * stages.substrate,
-                all * stages.prepare,
-                all * stages.simplify,
-            );
-            Repetition { seconds: stages, cpu_seconds: stages }
-        };
-        record.repetitions = (0..10).map(lap).collect();
-    }
-    records
+    repeated(10, |record, place, k| {
+        let load = 1.25 + 0.25 * (2.0 * common::noise(k, 0, 0) - 1.0);
+        let random = 1.0 + noise * (2.0 * common::noise(seed, place, k + 77) - 1.0);
+        [load * random, load * random, factor(record)]
+    })
 }
 
 #[test]
@@ -48,22 +56,12 @@ fn equal_records_and_noise_are_no_regression() {
 /// Records of a machine with two endless loops: in each repetition all CPU seconds of a build are longer by up
 /// to a fifth, in one of ten by another half, and the clock on the wall runs up to three times as long.
 fn busy(seed: usize, repetitions: usize, factor: f64) -> Vec<Record> {
-    let mut records = comparison(&SHAPES[..4], &METHODS, &[500, 100]);
-    for (place, record) in records.iter_mut().enumerate() {
-        let Some(stages) = record.simplify.seconds else { continue };
-        let lap = |k: usize| {
-            let noise = |what| common::noise(seed, k, what);
-            let share = factor * (1.0 + 0.2 * noise(1)) * if noise(2) < 0.1 { 1.5 } else { 1.0 };
-            let share = share * (1.0 + 0.05 * common::noise(seed, place, k + 77));
-            let by = |share: f64| {
-                let Stages { substrate, prepare, simplify, .. } = stages;
-                Stages::new(share * substrate, share * prepare, share * simplify)
-            };
-            Repetition { seconds: by(share * (1.0 + 2.0 * noise(3))), cpu_seconds: by(share) }
-        };
-        record.repetitions = (0..repetitions).map(lap).collect();
-    }
-    records
+    repeated(repetitions, |_, place, k| {
+        let noise = |what| common::noise(seed, k, what);
+        let share = factor * (1.0 + 0.2 * noise(1)) * if noise(2) < 0.1 { 1.5 } else { 1.0 };
+        let share = share * (1.0 + 0.05 * common::noise(seed, place, k + 77));
+        [share * (1.0 + 2.0 * noise(3)), share, 1.0]
+    })
 }
 
 #[test]
@@ -116,41 +114,32 @@ fn a_slower_mesh_is_reported_without_its_method() {
 #[test]
 fn changes_of_exact_quantities_are_reported_by_name() {
     let old = comparison(&SHAPES[..4], &METHODS, &[500, 100]);
-    let changed = |change: &dyn Fn(&mut Record)| {
+    let cases: [(&str, Meaning, fn(&mut Record, &mut Evaluation)); 7] = [
+        ("evaluate.hausdorff", Meaning::Regression, |_, e| e.distances.hausdorff *= 1.01),
+        ("evaluate.mean", Meaning::Improvement, |_, e| e.distances.mean *= 0.99),
+        // Below the threshold, but no less listed.
+        ("evaluate.hausdorff", Meaning::Changed, |_, e| e.distances.hausdorff *= 1.0 + 1e-12),
+        ("evaluate.betti", Meaning::Regression, |_, e| e.betti[1] += 1),
+        ("simplify.peak_bytes", Meaning::Regression, |record, _| {
+            record.simplify.peak_bytes = record.simplify.peak_bytes.map(|bytes| bytes + bytes / 10);
+        }),
+        ("simplify.diagnostics", Meaning::Changed, |record, _| {
+            *record.simplify.diagnostics.values_mut().next().unwrap() += 1;
+        }),
+        ("result_hash", Meaning::Changed, |record, _| record.result_hash = Some("12ab".into())),
+    ];
+    for (what, meaning, change) in cases {
         let mut new = old.clone();
         let one = new.iter_mut().rfind(|r| r.status.is_ok() && r.simplify.method == "qmat");
-        change(one.unwrap());
+        let one = one.unwrap();
+        let mut evaluation = one.evaluate.take().unwrap();
+        change(one, &mut evaluation);
+        one.evaluate = Some(evaluation);
         let diff = diff(&old, &new);
-        let found = diff.changes.iter().map(|c| (c.what.clone(), c.item.method.clone(), c.meaning));
-        found.collect::<Vec<_>>()
-    };
-    let one = |what: &str, meaning| vec![(what.to_owned(), "qmat".to_owned(), meaning)];
-    let error = changed(&|record| {
-        record.evaluate.as_mut().unwrap().distances.hausdorff *= 1.01;
-    });
-    assert_eq!(error, one("evaluate.hausdorff", Meaning::Regression));
-    let error = changed(&|record| {
-        record.evaluate.as_mut().unwrap().distances.mean *= 0.99;
-    });
-    assert_eq!(error, one("evaluate.mean", Meaning::Improvement));
-    // Below the threshold, but no less listed.
-    let error = changed(&|record| {
-        record.evaluate.as_mut().unwrap().distances.hausdorff *= 1.0 + 1e-12;
-    });
-    assert_eq!(error, one("evaluate.hausdorff", Meaning::Changed));
-    let betti = changed(&|record| record.evaluate.as_mut().unwrap().betti[1] += 1);
-    assert_eq!(betti, one("evaluate.betti", Meaning::Regression));
-    let memory = changed(&|record| {
-        let bytes = record.simplify.peak_bytes.as_mut().unwrap();
-        *bytes += *bytes / 10;
-    });
-    assert_eq!(memory, one("simplify.peak_bytes", Meaning::Regression));
-    let count = changed(&|record| {
-        *record.simplify.diagnostics.values_mut().next().unwrap() += 1;
-    });
-    assert_eq!(count[0].2, Meaning::Changed);
-    let hash = changed(&|record| record.result_hash = Some("12ab".into()));
-    assert_eq!(hash, one("result_hash", Meaning::Changed));
+        let [found] = &diff.changes[..] else { panic!("{what}: {}", diff.to_markdown()) };
+        assert!(found.what.starts_with(what), "{what}: {}", found.what);
+        assert_eq!((&*found.item.method, found.meaning), ("qmat", meaning), "{what}");
+    }
 }
 
 #[test]
