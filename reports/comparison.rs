@@ -340,18 +340,13 @@ fn mesh_labels(keys: &[MeshKey<'_>]) -> Vec<String> {
     let mut labels = vec![];
     for key in keys {
         let shared = keys.iter().filter(|other| other.name == key.name).count() > 1;
-        let hash = short(key.hash.unwrap_or("no hash"));
+        let hash = key.hash.unwrap_or("no hash");
         labels.push(printable(&match shared {
-            true => format!("{} ({hash})", key.name),
+            true => format!("{} ({hash:.8})", key.name),
             false => key.name.to_owned(), // hashes are noise where names suffice
         }));
     }
     labels
-}
-
-/// Enough of a hash to distinguish a few.
-fn short(hash: &str) -> String {
-    hash.chars().take(8).collect()
 }
 
 /// The identity of a row: the method with its parameters, and the conditions of the run. Records of two builds, of
@@ -436,8 +431,8 @@ impl<'a> SeriesKey<'a> {
             format!("dual {}", self.dual),
             format!("{} samples", self.samples),
             self.threads.map_or_else(String::new, |threads| format!("{threads} threads")),
-            format!("build {}", short(self.build)),
-            format!("plug-in {}", short(self.plugin.unwrap_or("none"))),
+            format!("build {:.8}", self.build),
+            format!("plug-in {:.8}", self.plugin.unwrap_or("none")),
         ]
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use medial_run::record::Record;
-use medial_run::text::{counted, grouped, printable, shortened};
+use medial_run::text::{aligned, counted, grouped, printable, shortened};
 
 use crate::answers::{equal_error_table, usual_level};
 use crate::comparison::{Comparison, reached, row_name};
@@ -119,24 +119,9 @@ fn plain(table: &Table) -> String {
         lines.push(texts.map(|(k, cell)| shortened(&printable(&cell.text), limit(k))).collect());
     }
     let widest = |k: usize| lines.iter().map(|line| line[k].chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..last).map(widest).collect();
-    let room = WIDTH.saturating_sub(widths.iter().map(|width| width + 2).sum());
-    let mut text = String::new();
-    for line in &lines {
-        let mut row = String::new();
-        for (k, &width) in widths.iter().enumerate() {
-            row += &match table.columns[k].number {
-                true => format!("{:>width$}  ", line[k]),
-                false => format!("{:<width$}  ", line[k]),
-            };
-        }
-        row += &match (shortened(&line[last], room), table.columns[last].number) {
-            (end, true) => format!("{end:>0$}", widest(last)),
-            (end, false) => end,
-        };
-        text = text + row.trim_end() + "\n";
-    }
-    text
+    let room = WIDTH.saturating_sub((0..last).map(|k| widest(k) + 2).sum());
+    lines.iter_mut().for_each(|line| line[last] = shortened(&line[last], room));
+    aligned(&lines, |k| table.columns[k].number)
 }
 
 /// A sentence in lines that fit; all but the first are indented.

@@ -58,6 +58,18 @@ pub fn counted(count: usize, one: &str, many: &str) -> String {
     format!("{} {}", grouped(count as u64), if count == 1 { one } else { many })
 }
 
+/// Lines of cells in columns, two spaces apart; some columns are flush right.
+pub fn aligned(lines: &[Vec<String>], is_right: impl Fn(usize) -> bool) -> String {
+    let widest = |k: usize| lines.iter().map(|line| line[k].chars().count()).max().unwrap_or(0);
+    let cell = |(k, cell): (usize, &String)| match is_right(k) {
+        true => format!("{cell:>0$}", widest(k)),
+        false => format!("{cell:<0$}", widest(k)),
+    };
+    let line =
+        |cells: &Vec<String>| cells.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ");
+    lines.iter().map(|cells| line(cells).trim_end().to_owned() + "\n").collect()
+}
+
 /// Betti numbers as `1, 4, 0`, where they were computed.
 pub fn betti(numbers: Option<[u64; 3]>) -> String {
     numbers.map_or("unknown".to_owned(), |[b0, b1, b2]| format!("{b0}, {b1}, {b2}"))

@@ -9,7 +9,7 @@ use medial::shape::{Fit, ShapeOptions};
 use medial_reports::measured_rows;
 use medial_run::axis::read_axis;
 use medial_run::evaluate::Evaluator;
-use medial_run::text::significant;
+use medial_run::text::{aligned, significant};
 use serde::Serialize;
 use serde_json::json;
 
@@ -180,16 +180,8 @@ fn print_table(
         }));
     }
     table.extend(measured_rows(&evaluations));
-    let width = |texts: &mut dyn Iterator<Item = &String>| texts.map(|t| t.chars().count()).max();
-    let titles = width(&mut table.iter().map(|(title, _)| title)).unwrap_or(0);
-    for (title, cells) in &table {
-        let mut line = format!("{title:<titles$}");
-        for (k, cell) in cells.iter().enumerate() {
-            let width = width(&mut table.iter().map(|(_, cells)| &cells[k])).unwrap_or(0);
-            line.push_str(&format!("  {cell:>width$}"));
-        }
-        print_line(line.trim_end());
-    }
+    let lines = table.into_iter().map(|(title, cells)| [vec![title], cells].concat());
+    print_line(aligned(&lines.collect::<Vec<_>>(), |k| k > 0).trim_end());
     for (file, row) in measured {
         for warning in row.evaluation.warnings.iter().chain(&row.defects) {
             print_line(&format!("warning: {}: {warning}", file.display()));

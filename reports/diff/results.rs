@@ -34,7 +34,7 @@ pub(super) struct Pair<'a> {
 type Request<'a> = (&'a str, String, u64, (Reverse<usize>, String));
 
 /// How it was run and measured, by name: has to agree.
-type Settings = [(&'static str, String); 4];
+pub(crate) type Settings = [(&'static str, String); 4];
 
 type Arranged<'a> = BTreeMap<Request<'a>, BTreeMap<Settings, &'a Record>>;
 
@@ -93,7 +93,7 @@ fn other_mesh(old: &Record, new: &Record) -> Option<String> {
     (a != b).then(|| format!("the mesh has other content: {b:.12}, {a:.12} before"))
 }
 
-fn settings(record: &Record) -> Settings {
+pub(crate) fn settings(record: &Record) -> Settings {
     let conditions = record.conditions.clone();
     let threads = record.simplify.threads;
     [

@@ -175,9 +175,9 @@ fn change_table(caption: &str, changes: &[&Change]) -> Table {
 pub(crate) fn shown(value: &Value) -> String {
     match value {
         Value::Null => "none".to_owned(), // appeared or vanished
-        Value::String(text) => text.chars().take(16).collect(),
+        Value::String(text) => format!("{text:.16}"),
         Value::Number(number) if number.is_f64() => significant(number.as_f64().unwrap_or(0.0), 6),
-        other => other.to_string().chars().take(48).collect(),
+        other => format!("{:.48}", other.to_string()),
     }
 }
 

@@ -38,9 +38,9 @@ impl Findings<'_> {
     fn summary(&self) -> String {
         let Some(newest) = self.runs.last() else { return "No run yet.".to_owned() };
         format!(
-            "Newest run, {} ({}): {} among {} with an earlier run. The history has {} of {}.",
+            "Newest run, {} ({:.8}): {} among {} with an earlier run. The history has {} of {}.",
             newest.date,
-            short(&newest.commit),
+            newest.commit,
             counted(self.regressions, "regression", "regressions"),
             counted(self.compared, "result", "results"),
             counted(self.runs.len(), "run", "runs"),
@@ -76,8 +76,7 @@ fn table((caption, changes): (&str, Vec<&DatedChange>)) -> Table {
     let rows = Table::of(&changes[..changes.len().min(MOST_ROWS)])
         .text("run", |dated| dated.first_after.date.clone())
         .text("commits", |dated| {
-            let commits = [&dated.last_before, &dated.first_after];
-            commits.map(|run| short(&run.commit)).join("..")
+            format!("{:.8}..{:.8}", dated.last_before.commit, dated.first_after.commit)
         })
         .text("series", |dated| {
             let item = &dated.change.item;
@@ -105,9 +104,4 @@ fn percent(share: f64) -> String {
     // Errors of six digits change by less than a decimal shows.
     let digits = if size < 0.05 { significant(size, 2) } else { format!("{size:.1}") };
     format!("{sign}{digits} %")
-}
-
-/// The first digits of a commit.
-fn short(commit: &str) -> &str {
-    commit.get(..8).unwrap_or(commit)
 }

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::comparison::row_name;
-use crate::diff::results::{Facts, expected_betti, gates};
+use crate::diff::results::{Facts, expected_betti, gates, settings};
 use crate::metric::median;
 
 /// The measurements of one build in one study.
@@ -189,7 +189,7 @@ impl Point {
             .or(record.simplify.cpu_seconds.map(|stages| own_seconds(method, &stages)));
         Self {
             mesh: printable(&record.mesh),
-            mesh_hash: record.mesh_hash.as_deref().map(first_digits).unwrap_or_default(),
+            mesh_hash: format!("{:.12}", record.mesh_hash.as_deref().unwrap_or_default()),
             method: printable(&row_name(record)),
             level: record.simplify.level.to_string(), // stable across versions
             status: record.status,
@@ -215,14 +215,10 @@ fn rounded(value: f64, digits: usize) -> Option<f64> {
 /// Six significant digits of an error, twelve of a hash: more would only make the files large.
 fn shortened(value: Value) -> Value {
     match value {
-        Value::String(text) if text.len() == 64 => first_digits(&text).into(),
+        Value::String(text) if text.len() == 64 => format!("{text:.12}").into(),
         value if value.is_f64() => value.as_f64().and_then(|number| rounded(number, 6)).into(),
         value => value,
     }
-}
-
-fn first_digits(hash: &str) -> String {
-    hash.chars().take(12).collect()
 }
 
 /// The machine, its memory to the gigabyte: the kernel's own share differs from boot to boot.
@@ -233,14 +229,9 @@ fn machine(machine: &Machine) -> String {
 }
 
 fn conditions(record: &Record) -> String {
-    let conditions = &record.conditions;
     let seeds: Vec<String> = record.seeds.iter().map(|(of, seed)| format!("{of} {seed}")).collect();
-    let threads = record.simplify.threads.map_or("unknown".to_owned(), |n| n.to_string());
-    printable(&format!(
-        "sampling {}; dual {}; samples {}; seeds {}; threads {threads}",
-        conditions.sampling,
-        conditions.dual,
-        conditions.samples,
-        seeds.join(", ")
-    ))
+    let [sampling, dual, samples, threads] =
+        settings(record).map(|(name, value)| format!("{name} {value}"));
+    let seeds = format!("seeds {}", seeds.join(", "));
+    printable(&[sampling, dual, samples, seeds, threads].join("; "))
 }

@@ -342,8 +342,7 @@ fn figures(figures: &[Figure]) -> Vec<Value> {
 
 fn earlier(run: &RunNote) -> String {
     let date = run.date.as_deref().unwrap_or("no date");
-    let build: String = run.binary_hash.chars().take(8).collect();
-    format!("{date}, medial {} (build {build}): {}", run.version, run.command)
+    format!("{date}, medial {} (build {:.8}): {}", run.version, run.binary_hash, run.command)
 }
 
 /// The meaning of each metric. The page knows those of its other words.
