@@ -55,7 +55,7 @@ pub fn write_report(
         false => files.write("results.csv", &csv)?,
     }
 
-    let answers = purpose_table(&comparison, &how);
+    let answers = Vec::from_iter(purpose_table(&comparison, &how));
     let mut equal_error: Vec<Table> = equal_error_table(&comparison, &how).into_iter().collect();
     let mut means = vec![means_table(&comparison, &summaries, &how)];
     if !natives.is_empty() {
@@ -64,22 +64,17 @@ pub fn write_report(
     means.retain(|table| !table.rows.is_empty()); // a study of error bounds alone has none
     let all_means: Vec<Table> = equal_error.iter().chain(&means).cloned().collect();
     files.write_tables("summary", "Summary", &all_means)?;
-    if answers.is_some() {
-        files.write_tables("overview-purpose", "Which method?", answers.as_slice())?;
-    }
-
-    let [structure, cover] =
-        topic_tables(&comparison, &how).map(|table| table.into_iter().collect::<Vec<_>>());
-    for (stem, title, tables) in
-        [("structure", "Structure", &structure), ("cover", "Cover", &cover)]
-    {
-        if !tables.is_empty() {
-            files.write_tables(&format!("overview-{stem}"), title, tables)?;
-        }
-    }
+    let [structure, cover] = topic_tables(&comparison, &how).map(Vec::from_iter);
     let differences = if is_one { vec![] } else { difference_tables(&comparison, &how) };
-    if !differences.is_empty() {
-        files.write_tables("overview-differences", "Differences between methods", &differences)?;
+    for (stem, title, tables) in [
+        ("overview-purpose", "Which method?", &answers),
+        ("overview-structure", "Structure", &structure),
+        ("overview-cover", "Cover", &cover),
+        ("overview-differences", "Differences between methods", &differences),
+    ] {
+        if !tables.is_empty() {
+            files.write_tables(stem, title, tables)?;
+        }
     }
     if !is_one {
         let name = "tables/overview-differences.csv";
@@ -140,7 +135,7 @@ pub fn write_report(
     let page = Page {
         header,
         comparison: &comparison,
-        answers,
+        answers: answers.into_iter().next(),
         overview: overview_table(&comparison, &summaries, &header.methods),
         sections: sections.into_iter().filter(|section| !section.2.is_empty()).collect(),
         figures: &figures,

@@ -197,8 +197,7 @@ impl Build {
         let output = Command::new(&program).arg("--version").output().map_err(failed)?;
         let output = String::from_utf8_lossy(&output.stdout).trim().to_owned();
         let Some(version) = output.strip_prefix("medial ") else {
-            let (found, program): (String, _) =
-                (output.chars().take(40).collect(), program.display());
+            let (found, program) = (format!("{output:.40}"), program.display());
             return Err(format!(
                 "{program}: not a build of medial (`--version` printed {found:?})"
             ));

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use medial::simplifier::{MedialSimplifier, MethodInfo, Presentation, Registered};
+use medial::simplifier::{MedialSimplifier, Presentation, Registered};
 use medial_methods::initial;
 use medial_run::hash::hex_digest;
 use serde::{Serialize, Serializer};
@@ -33,31 +33,25 @@ pub struct Registry {
     pub remarks: Vec<String>,
 }
 
-/// A method, its presentation, and for a plug-in a hash of its files.
+/// A method, its presentation, and for a plug-in a hash of its files. As JSON the first two, in one object.
+#[derive(Serialize)]
 pub struct Entry {
+    #[serde(flatten, serialize_with = "described")]
     method: Arc<dyn MedialSimplifier>,
     /// How it is presented.
+    #[serde(flatten)]
     pub presentation: Presentation,
     /// Hash of the declaration and the files of a plug-in; `None` for a method of the program, which
     /// the program's own hash covers.
+    #[serde(skip)]
     pub fingerprint: Option<String>,
     /// See [`Registered::version`].
+    #[serde(skip)]
     version: Option<String>,
 }
 
-/// The description and the presentation as one object.
-impl Serialize for Entry {
-    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        #[derive(Serialize)]
-        struct Described<'a> {
-            #[serde(flatten)]
-            info: &'a MethodInfo,
-            #[serde(flatten)]
-            presentation: &'a Presentation,
-        }
-        let (info, presentation) = (self.method.info(), &self.presentation);
-        Described { info, presentation }.serialize(to)
-    }
+fn described<S: Serializer>(method: &Arc<dyn MedialSimplifier>, to: S) -> Result<S::Ok, S::Error> {
+    method.info().serialize(to)
 }
 
 impl Entry {

@@ -116,24 +116,6 @@ fn threads_change_no_byte() {
 }
 
 #[test]
-fn wrong_arguments_exit_with_a_usage_error() {
-    let at = Folder::new();
-    for line in [
-        "compare builtin:nothing --methods nothing",
-        "compare --spheres 0",
-        "compare --levels qmat",
-        "simplify builtin:box --method qmat --spheres 5 --set no=1 -o x.ma",
-        "simplify builtin:box --method angle --level 999 -o x.ma",
-        "axis builtin:box --sampling red:5",
-        "axis builtin:box:x",
-        "info builtin:box --threads 0",
-    ] {
-        at.refused(line, 2, "");
-    }
-    at.refused("simplify no-such-file.off --method qmat", 1, "no-such-file.off");
-}
-
-#[test]
 fn printed_results() {
     let at = Folder::new();
     let simplified = at.done("simplify builtin:capsule --method qmat --spheres 20 -o qmat.ma");
@@ -145,11 +127,20 @@ fn printed_results() {
 }
 
 #[test]
-fn absurd_requests_are_refused_at_once() {
+fn wrong_and_absurd_requests_are_refused_at_once() {
     let at = Folder::new();
     at.write("ball.ma", "1 0 0\nv 0 0 0 1\n");
     at.write("huge.ma", "1 0 0\nv 0 0 0 1e200\n");
     for (line, code, part) in [
+        ("compare builtin:nothing --methods nothing", 2, ""),
+        ("compare --spheres 0", 2, ""),
+        ("compare --levels qmat", 2, ""),
+        ("simplify builtin:box --method qmat --spheres 5 --set no=1 -o x.ma", 2, ""),
+        ("simplify builtin:box --method angle --level 999 -o x.ma", 2, ""),
+        ("axis builtin:box --sampling red:5", 2, ""),
+        ("axis builtin:box:x", 2, ""),
+        ("info builtin:box --threads 0", 2, ""),
+        ("simplify no-such-file.off --method qmat", 1, "no-such-file.off"),
         ("info builtin:sphere:8 --threads 100000", 2, "1024"),
         ("evaluate builtin:sphere:8 ball.ma --samples 99999999999", 2, "10000000"),
         ("evaluate builtin:sphere:8 ball.ma --certify 1e-9", 2, "1e-6"),
