@@ -30,7 +30,6 @@ pub enum Status {
     /// A valid medial mesh.
     Ok,
     /// A valid medial mesh, read from a file of another program.
-    #[serde(alias = "as_given")]
     External,
     /// A valid medial mesh with a number of spheres more than 2 % off the requested one.
     OtherCount,

@@ -114,7 +114,8 @@ fn a_slower_mesh_is_reported_without_its_method() {
 #[test]
 fn changes_of_exact_quantities_are_reported_by_name() {
     let old = comparison(&SHAPES[..4], &METHODS, &[500, 100]);
-    let cases: [(&str, Meaning, fn(&mut Record, &mut Evaluation)); 7] = [
+    type Case = (&'static str, Meaning, fn(&mut Record, &mut Evaluation));
+    let cases: [Case; 7] = [
         ("evaluate.hausdorff", Meaning::Regression, |_, e| e.distances.hausdorff *= 1.01),
         ("evaluate.mean", Meaning::Improvement, |_, e| e.distances.mean *= 0.99),
         // Below the threshold, but no less listed.

@@ -43,6 +43,13 @@ fn text<'a>(files: &'a BTreeMap<String, Vec<u8>>, name: &str) -> &'a str {
     std::str::from_utf8(&files[name]).unwrap()
 }
 
+/// The heads and the rows of `results.csv`.
+fn csv_of(records: &[Record]) -> (csv::StringRecord, Vec<csv::StringRecord>) {
+    let files = report_of(records);
+    let mut reader = csv::Reader::from_reader(&files["results.csv"][..]);
+    (reader.headers().unwrap().clone(), reader.records().map(Result::unwrap).collect())
+}
+
 #[test]
 fn the_same_records_give_the_same_bytes() {
     let records = comparison(&SHAPES[..4], &METHODS, &COUNTS);
@@ -69,11 +76,9 @@ fn disturbed_seconds_are_excluded_from_tables() {
         record.conditions.jobs = 2;
     }
     let seconds = |records: &[Record]| -> Vec<String> {
-        let files = report_of(records);
-        let mut reader = csv::Reader::from_reader(&files["results.csv"][..]);
-        let names = reader.headers().unwrap().clone();
+        let (names, rows) = csv_of(records);
         let place = names.iter().position(|name| name == "seconds_total").unwrap();
-        reader.records().map(|row| row.unwrap()[place].to_owned()).collect()
+        rows.iter().map(|row| row[place].to_owned()).collect()
     };
     assert!(seconds(&alone).iter().all(|cell| !cell.is_empty()));
     assert!(seconds(&disturbed).iter().all(String::is_empty));
@@ -93,12 +98,9 @@ fn disturbed_seconds_are_excluded_from_tables() {
 #[test]
 fn every_record_is_a_row_of_the_csv_with_its_numbers() {
     let records = comparison(&SHAPES[..6], &METHODS, &COUNTS);
-    let files = report_of(&records);
-    let mut reader = csv::Reader::from_reader(&files["results.csv"][..]);
-    let names = reader.headers().unwrap().clone();
+    let (names, rows) = csv_of(&records);
     let column =
         |name: &str| names.iter().position(|n| n == name).unwrap_or_else(|| panic!("{name}"));
-    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
     let columns = ["mesh", "method", "status", "hausdorff"].map(column);
     let mut found: Vec<[String; 4]> =
         rows.iter().map(|row| columns.map(|k| row[k].to_owned())).collect();
@@ -118,19 +120,12 @@ fn every_record_is_a_row_of_the_csv_with_its_numbers() {
 #[test]
 fn no_method_gains_by_failing() {
     // Both are equal where both have a result; one fails on the mesh that is hard for the other.
-    let mut records = vec![
-        ok("easy", "qmat", 100, 0, 0),
-        ok("hard", "qmat", 100, 1, 0),
-        ok("easy", "angle", 100, 0, 0),
+    let files = report_of(&[
+        with_error(ok("easy", "qmat", 100, 0, 0), 0.0123),
+        with_error(ok("hard", "qmat", 100, 1, 0), 0.5),
+        with_error(ok("easy", "angle", 100, 0, 0), 0.0123),
         failed("hard", "angle", 100, Status::Panicked, "index out of bounds"),
-    ];
-    let set = |record: &mut Record, hausdorff: f64| {
-        record.evaluate.as_mut().unwrap().distances.hausdorff = hausdorff;
-    };
-    set(&mut records[0], 0.0123);
-    set(&mut records[1], 0.5);
-    set(&mut records[2], 0.0123);
-    let files = report_of(&records);
+    ]);
     let summary = text(&files, "tables/summary.md");
     let row = |method: &str| {
         let mut rows = summary.lines().filter(|line| line.contains(&format!("| {method} |")));
@@ -294,9 +289,7 @@ fn csv_cells_are_never_formulas() {
     let mut refused = failed("@bear", "qmat", 100, Status::Refused, "-1 faces");
     refused.command = "+medial".to_owned();
     records.push(refused);
-    let files = report_of(&records);
-    let rows: Vec<csv::StringRecord> =
-        csv::Reader::from_reader(&files["results.csv"][..]).records().map(Result::unwrap).collect();
+    let (_, rows) = csv_of(&records);
     let cells: Vec<&str> = rows.iter().flat_map(csv::StringRecord::iter).collect();
     for cell in cells.iter().filter(|cell| cell.starts_with(['=', '+', '-', '@', '\t', '\r'])) {
         assert!(cell.parse::<f64>().is_ok(), "{cell}");
