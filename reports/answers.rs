@@ -313,8 +313,8 @@ fn row_of(comparison: &Comparison<'_>, criterion: &Criterion, ranks: &[Rank]) ->
     let mut cells = vec![
         Cell::from(criterion.title.clone()),
         Cell { best: true, ..Cell::from(comparison.series[first].as_str()) },
-        Cell::optional(ranks[0].median.filter(|_| !is_time).map(criterion.text)),
-        Cell::optional(match is_time {
+        Cell::from(ranks[0].median.filter(|_| !is_time).map(criterion.text)),
+        Cell::from(match is_time {
             true => ranks[0].median.map(criterion.text),
             false => seconds.map(|seconds| significant(seconds, 3)),
         }),
@@ -326,8 +326,8 @@ fn row_of(comparison: &Comparison<'_>, criterion: &Criterion, ranks: &[Rank]) ->
     let ratio = ratio.map(|ratio| format!("{} of {}", ratio.text(2), criterion.of));
     cells.extend([
         Cell::from(runner_up.map_or("no other", |second| comparison.series[second].as_str())),
-        Cell::optional(ratio),
-        Cell::optional(pair.map(|pair| match (pair.meshes(), pair.is_established()) {
+        Cell::from(ratio),
+        Cell::from(pair.map(|pair| match (pair.meshes(), pair.is_established()) {
             (meshes, true) => format!("yes, n = {meshes}"),
             (meshes, false) => format!("no, n = {meshes}"),
         })),
@@ -349,7 +349,7 @@ fn right_everywhere(comparison: &Comparison<'_>, level: usize, spheres: &str) ->
     let title = format!("topology right everywhere, lowest error at {spheres}");
     let criterion = error_criterion(errors, title);
     row_of(comparison, &criterion, &ranks).unwrap_or_else(|| {
-        let none = [(); 6].map(|()| Cell::optional(None));
+        let none = [(); 6].map(|()| Cell::from(None));
         [criterion.title.into(), "none".into()].into_iter().chain(none).collect()
     })
 }
@@ -420,23 +420,18 @@ pub(crate) fn equal_error_table(comparison: &Comparison<'_>, how: &str) -> Optio
         rows.extend(own);
     }
     let yardstick = reference.map_or("reference", |series| &comparison.series[series]);
-    let whole =
-        |value: Option<f64>| Cell::optional(value.map(|value| grouped(value.round() as u64)));
+    let whole = |value: Option<f64>| value.map(|value| grouped(value.round() as u64));
     let rows = Table::of(&rows)
         .number("error (%)", |row| row.percent.to_string())
         .text("method", |row| comparison.series[row.entries[0].series].as_str())
         .text("valid on", |row| format!("{} of {}", row.met.len(), row.entries.len()))
         .number("spheres ↓", |row| whole(row.spheres()))
-        .number(format!("÷ {yardstick}"), |row| {
-            Cell::optional(row.ratio.map(|ratio| ratio.text(3)))
-        })
-        .text("on", |row| {
-            Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes")))
-        })
+        .number(format!("÷ {yardstick}"), |row| row.ratio.map(|ratio| ratio.text(3)))
+        .text("on", |row| row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes")))
         .number("stored numbers ↓", |row| whole(row.median(stored_numbers)))
         .number("total (s) ↓", |row| {
             let seconds = row.median(|record| TOTAL_SECONDS.of(record));
-            Cell::optional(seconds.map(|seconds| significant(seconds, 3)))
+            seconds.map(|seconds| significant(seconds, 3))
         })
         .text("topology right", |row| Cell::share(topology(&row.met)))
         .text("failed", |row| match row.failed() {

@@ -5,7 +5,7 @@ use medial_run::text::{counted, significant};
 use crate::answers::{errors_at, ranked, samples};
 use crate::comparison::Comparison;
 use crate::statistics::{FEWEST, LEVEL, Paired, Pairs};
-use crate::tables::{Cell, Table};
+use crate::tables::Table;
 
 /// The methods at each number of spheres, the best median error first, with all pairs.
 fn rankings(comparison: &Comparison<'_>) -> Vec<(usize, Pairs)> {
@@ -25,7 +25,7 @@ pub(crate) fn difference_tables(comparison: &Comparison<'_>, how: &str) -> Vec<T
     for (spheres, pairs) in rankings(comparison) {
         let first = pairs.series[0];
         let cell = |series: usize, text: fn(&Paired) -> Option<String>| {
-            Cell::optional(pairs.between(series, first).and_then(|pair| text(&pair)))
+            pairs.between(series, first).and_then(|pair| text(&pair))
         };
         let rows = Table::of(&pairs.series)
             .text("method", |&series| name(series))

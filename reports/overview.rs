@@ -43,7 +43,7 @@ pub(crate) fn overview_table(
         let text = row.mean(metric).map(|mean| metric.format_mean(mean));
         // Means over fewer meshes do not compare with the others.
         let is_over_all = row.over == summary.meshes;
-        Cell::optional(text.map(|t| if is_over_all { t } else { format!("({t})") }))
+        text.map(|t| if is_over_all { t } else { format!("({t})") })
     };
     let table = Table::of(&rows)
         .text("method", |row| comparison.series[row.series].as_str())
@@ -51,7 +51,7 @@ pub(crate) fn overview_table(
             let own = comparison.at(row.series, level).into_iter().filter(|e| e.comparable());
             let counts = own.filter_map(|entry| Some(reached(entry.record)? as f64));
             let mean = Mean::Arithmetic.of(&counts.collect::<Vec<_>>());
-            Cell::optional(mean.map(|mean| grouped(mean.round() as u64)))
+            mean.map(|mean| grouped(mean.round() as u64))
         })
         .number("Hausdorff %", |row| mean(row, &HAUSDORFF))
         .number("mean %", |row| mean(row, &MEAN_ERROR))

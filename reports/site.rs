@@ -14,7 +14,7 @@ use crate::comparison::{Comparison, Entry, reached};
 use crate::header::{Header, MethodNote, method_pages};
 use crate::metric::{HAUSDORFF, MEAN_ERROR, MIN_ANGLE, TOTAL_SECONDS};
 use crate::pictures::strips;
-use crate::tables::{Cell, Table, mesh_table, to_html, topology_word};
+use crate::tables::{Table, mesh_table, to_html, topology_word};
 use crate::write::{Files, write_report};
 
 /// Writes the site of some records into a folder: the report without medial meshes, and further pages. Pictures and 3D views
@@ -156,13 +156,11 @@ impl Site<'_> {
         let mut rows = Table::of(&entries)
             .text("mesh", |entry| comparison.meshes[entry.mesh].as_str())
             .number("requested", |entry| entry.record.simplify.level.to_string())
-            .number("spheres", |entry| {
-                Cell::optional(reached(entry.record).map(|n| grouped(n as u64)))
-            })
-            .text("rank by Hausdorff", |entry| Cell::optional(rank(entry)));
+            .number("spheres", |entry| reached(entry.record).map(|n| grouped(n as u64)))
+            .text("rank by Hausdorff", |entry| rank(entry));
         for metric in [&HAUSDORFF, &MEAN_ERROR, &MIN_ANGLE, &TOTAL_SECONDS] {
             rows = rows.number(metric.heading(), |entry| {
-                Cell::optional(metric.of(entry.record).map(|value| metric.format(value)))
+                metric.of(entry.record).map(|value| metric.format(value))
             });
         }
         let rows = rows.text("as solid", |entry| topology_word(entry));

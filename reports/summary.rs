@@ -324,9 +324,7 @@ pub(crate) fn native_table(
         .number("spheres", |(_, point)| grouped(point.spheres.round() as u64))
         .number(HAUSDORFF.heading(), |(_, point)| significant(point.hausdorff, 3))
         .number(MEAN_ERROR.heading(), |(_, point)| significant(point.mean, 3))
-        .number("total (s)", |(_, point)| {
-            Cell::optional(point.seconds.map(|seconds| significant(seconds, 3)))
-        })
+        .number("total (s)", |(_, point)| point.seconds.map(|seconds| significant(seconds, 3)))
         .text("topology right", |(_, point)| Cell::share(point.topology));
     let note = "Geometric means over one set of meshes for each method: those with a result at all \
          its levels. The level is the method's own scalar, with its name and unit. Spheres are \
@@ -359,12 +357,8 @@ pub(crate) fn means_table(
         .number("spheres", |(summary, _)| grouped(summary.count as u64))
         .text("method", |(_, row)| comparison.series[row.series].as_str())
         .text("means over", |(_, row)| Cell::share((row.over, row.requested)))
-        .number(format!("Hausdorff ÷ {yardstick}"), |(_, row)| {
-            Cell::optional(row.ratio.map(|ratio| ratio.text(3)))
-        })
-        .text("on", |(_, row)| {
-            Cell::optional(row.ratio.map(|ratio| counted(ratio.meshes, "mesh", "meshes")))
-        });
+        .number(format!("Hausdorff ÷ {yardstick}"), |(_, row)| row.ratio.map(|r| r.text(3)))
+        .text("on", |(_, row)| row.ratio.map(|r| counted(r.meshes, "mesh", "meshes")));
     for metric in comparison.columns() {
         rows = rows.number(metric.heading(), |(summary, row)| mean_cell(summary, row, metric));
     }
@@ -402,7 +396,7 @@ pub(crate) fn means_table(
 
 /// A mean, in parentheses where it is not over all meshes.
 fn mean_cell(summary: &CountSummary, row: &SeriesSummary, metric: &Metric) -> Cell {
-    let Some(mean) = row.mean(metric) else { return Cell::optional(None) };
+    let Some(mean) = row.mean(metric) else { return Cell::from(None) };
     let (text, over) = (metric.format_mean(mean), row.over(metric));
     let is_whole = summary.is_whole_of(row, metric);
     // Two means that read the same are equally good.

@@ -162,9 +162,7 @@ fn change_table(caption: &str, changes: &[&Change]) -> Table {
         .text("what", |change| change.what.clone())
         .text("old", |change| shown(&change.old))
         .text("new", |change| shown(&change.new))
-        .text("change", |change| {
-            Cell::optional(change.relative.map(|share| format!("{:+.2} %", 100.0 * share)))
-        });
+        .text("change", |change| change.relative.map(|share| format!("{:+.2} %", 100.0 * share)));
     Table {
         caption: format!("{caption}: {}", counted(changes.len(), "change", "changes")),
         notes: left_out(changes.len(), MOST_ROWS),

@@ -77,27 +77,25 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
     let mut rows = Table::of(&entries)
         .number("requested", |entry| level_label(entry.record.simplify.level))
         .text("method", |entry| comparison.series[entry.series].as_str())
-        .number("spheres", |entry| {
-            Cell::optional(reached(entry.record).map(|count| grouped(count as u64)))
-        });
+        .number("spheres", |entry| reached(entry.record).map(|count| grouped(count as u64)));
     for metric in comparison.columns() {
         rows = rows.number(metric.heading(), |entry| match metric.of(entry.record) {
             Some(value) => {
                 Cell { text: metric.format(value), best: best.is_best(entry, metric, value) }
             }
-            None => Cell::optional(None),
+            None => Cell::from(None),
         });
     }
     let has_seeds = entries.iter().any(|entry| comparison.range(entry, &HAUSDORFF).is_some());
     if has_seeds {
         rows = rows.text("Hausdorff over seeds", |entry| {
             let range = comparison.range(entry, &HAUSDORFF);
-            Cell::optional(range.map(|ends| ends.map(|end| HAUSDORFF.format(end)).join(" to ")))
+            range.map(|ends| ends.map(|end| HAUSDORFF.format(end)).join(" to "))
         });
     }
     rows = rows.text("Betti", |entry| {
         let evaluation = entry.record.evaluate.as_ref();
-        Cell::optional(evaluation.map(|evaluation| betti(Some(evaluation.betti))))
+        evaluation.map(|evaluation| betti(Some(evaluation.betti)))
     });
     rows = rows.text("as solid", topology_word);
     rows = rows.text("remark", remark);

@@ -140,21 +140,29 @@ pub(crate) struct Cell {
     pub(crate) best: bool,
 }
 
-impl<T: Into<String>> From<T> for Cell {
-    fn from(text: T) -> Self {
-        Self { text: text.into(), best: false }
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self { text, best: false }
+    }
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        text.to_owned().into()
+    }
+}
+
+impl From<Option<String>> for Cell {
+    /// A dash where there is nothing.
+    fn from(text: Option<String>) -> Self {
+        text.unwrap_or_else(|| UNKNOWN.to_owned()).into()
     }
 }
 
 impl Cell {
-    /// A dash where there is nothing.
-    pub(crate) fn optional(text: Option<String>) -> Self {
-        text.unwrap_or_else(|| UNKNOWN.to_owned()).into()
-    }
-
     /// `3 of 4`; a dash of none.
     pub(crate) fn share((part, all): (usize, usize)) -> Self {
-        Self::optional((all > 0).then(|| format!("{part} of {all}")))
+        (all > 0).then(|| format!("{part} of {all}")).into()
     }
 }
 

@@ -58,7 +58,7 @@ impl Topic {
             .text("method", |(_, series, _)| comparison.series[*series].as_str());
         for &metric in self.metrics {
             rows = rows.number(metric.heading(), |(count, _, entries)| {
-                let Some(own) = value(metric, entries) else { return Cell::optional(None) };
+                let Some(own) = value(metric, entries) else { return Cell::from(None) };
                 let others = items.iter().filter(|(other, ..)| other == count);
                 let best = others.filter_map(|(.., entries)| value(metric, entries));
                 let best = best.reduce(|a, b| pick(metric, a, b));
