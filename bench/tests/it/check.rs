@@ -124,15 +124,6 @@ fn methods_that_print_unusual_output_pass() {
 }
 
 #[test]
-fn unknown_names_exit_with_a_usage_error() {
-    let at = Folder::new();
-    at.refused("check nothing", 2, "unknown method `nothing` (expected one of: angle");
-    at.refused("check qmat --case nothing", 2, "(expected one of: report");
-    at.refused("check qmat --set nothing=1", 2, "list them by `medial methods qmat`");
-    at.refused("check qmat --timeout 0", 2, "positive");
-}
-
-#[test]
 fn each_case_prints_a_line() {
     let text = Folder::new().done("check qmat --case report --case no-spheres");
     let lines: Vec<&str> = text.lines().collect();

@@ -150,6 +150,22 @@ fn wrong_and_absurd_requests_are_refused_at_once() {
         ("simplify builtin:sphere:8 -m qmat --max-error inf", 2, "inf"),
         ("simplify builtin:sphere:8 -m qmat --set k=x -o x.ma", 2, "k = \"x\""),
         ("simplify builtin:nothing -m qmat", 2, "`nothing`"),
+        // With a suggestion.
+        ("simplify builtin:sphere:8 -m qmat --max-error 5", 2, "write 0.05 for 5 %"),
+        ("simplify builtin:sphere:8 -m qmat --max-error 1", 2, "write 0.01 for 1 %"),
+        ("simplify builtin:sphere:8 -m hem --level inf -o x.ma", 2, "inf is not a distance"),
+        ("simplify builtin:sphere:8 -m qmta", 2, "did you mean `qmat`?"),
+        ("simplify builtin:sphere:8 --level 60", 2, "no method: name one with --method ID"),
+        ("simplify builtin:sphere:8", 2, "request --spheres N or --max-error E"),
+        ("methods dey-zhoa", 2, "did you mean `dey-zhao`?"),
+        ("info builtin:shpere", 2, "did you mean `sphere`?"),
+        ("datasets make shpere -o x.off", 2, "did you mean `sphere`?"),
+        ("info builtin:sphere:2000", 2, "about 4.2e6 vertices"),
+        ("simplfy builtin:sphere:8", 2, "'simplify'"),
+        ("check nothing", 2, "unknown method `nothing` (expected one of: angle"),
+        ("check qmat --case nothing", 2, "(expected one of: report"),
+        ("check qmat --set nothing=1", 2, "list them by `medial methods qmat`"),
+        ("check qmat --timeout 0", 2, "positive"),
     ] {
         at.refused(line, code, part);
     }

@@ -87,26 +87,6 @@ fn a_signal_leaves_no_temporary_behind() {
 }
 
 #[test]
-fn typing_errors_are_refused_with_a_suggestion() {
-    let at = Folder::new();
-    for (line, expected) in [
-        ("simplify builtin:sphere:8 -m qmat --max-error 5", "write 0.05 for 5 %"),
-        ("simplify builtin:sphere:8 -m qmat --max-error 1", "write 0.01 for 1 %"),
-        ("simplify builtin:sphere:8 -m hem --level inf -o x.ma", "inf is not a distance"),
-        ("simplify builtin:sphere:8 -m qmta", "did you mean `qmat`?"),
-        ("simplify builtin:sphere:8 --level 60", "no method: name one with --method ID"),
-        ("simplify builtin:sphere:8", "request --spheres N or --max-error E"),
-        ("methods dey-zhoa", "did you mean `dey-zhao`?"),
-        ("info builtin:shpere", "did you mean `sphere`?"),
-        ("datasets make shpere -o x.off", "did you mean `sphere`?"),
-        ("info builtin:sphere:2000", "about 4.2e6 vertices"),
-        ("simplfy builtin:sphere:8", "'simplify'"),
-    ] {
-        at.refused(line, 2, expected);
-    }
-}
-
-#[test]
 fn a_result_without_a_file_is_refused_before_it_is_computed() {
     let at = Folder::new();
     let simplify = "simplify builtin:sphere:8 -m qmat --spheres 5";
