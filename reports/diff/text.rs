@@ -8,10 +8,7 @@ use serde_json::Value;
 use super::results::MEMORY;
 use super::{Change, Diff, ItemName, LEAST_SLOWDOWN, Meaning, Unlike};
 use crate::metric::METRICS;
-use crate::tables::{Cell, Table, escape, left_out, to_markdown};
-
-/// Rows of a table of changes; the JSON has all.
-const MOST_ROWS: usize = 40;
+use crate::tables::{Cell, Table, escape, to_markdown};
 
 /// Names of missing results in a sentence.
 const MOST_NAMES: usize = 5;
@@ -155,19 +152,17 @@ fn sides(diff: &Diff) -> String {
 }
 
 fn change_table(caption: &str, changes: &[&Change]) -> Table {
-    let rows = Table::of(&changes[..changes.len().min(MOST_ROWS)])
-        .text("mesh", |change| change.item.mesh.clone())
-        .text("method", |change| change.item.method.clone())
-        .text("level", |change| change.item.level.clone())
-        .text("what", |change| change.what.clone())
-        .text("old", |change| shown(&change.old))
-        .text("new", |change| shown(&change.new))
-        .text("change", |change| change.relative.map(|share| format!("{:+.2} %", 100.0 * share)));
-    Table {
-        caption: format!("{caption}: {}", counted(changes.len(), "change", "changes")),
-        notes: left_out(changes.len(), MOST_ROWS),
-        ..rows.table
-    }
+    Table::of_changes(caption, changes, |rows| {
+        rows.text("mesh", |change| change.item.mesh.clone())
+            .text("method", |change| change.item.method.clone())
+            .text("level", |change| change.item.level.clone())
+            .text("what", |change| change.what.clone())
+            .text("old", |change| shown(&change.old))
+            .text("new", |change| shown(&change.new))
+            .text("change", |change| {
+                change.relative.map(|share| format!("{:+.2} %", 100.0 * share))
+            })
+    })
 }
 
 pub(crate) fn shown(value: &Value) -> String {

@@ -5,10 +5,7 @@ use medial_run::text::{counted, significant};
 use super::{DatedChange, Findings};
 use crate::diff::Meaning;
 use crate::diff::text::shown;
-use crate::tables::{Cell, Table, escape, left_out, to_markdown};
-
-/// More rows of one kind are counted, not listed: the JSON has them all.
-const MOST_ROWS: usize = 40;
+use crate::tables::{Cell, Table, escape, to_markdown};
 
 impl Findings<'_> {
     /// The findings as Markdown: regressions of the newest run first.
@@ -73,28 +70,24 @@ impl Findings<'_> {
 }
 
 fn table((caption, changes): (&str, Vec<&DatedChange>)) -> Table {
-    let rows = Table::of(&changes[..changes.len().min(MOST_ROWS)])
-        .text("run", |dated| dated.first_after.date.clone())
-        .text("commits", |dated| {
-            format!("{:.8}..{:.8}", dated.last_before.commit, dated.first_after.commit)
-        })
-        .text("series", |dated| {
-            let item = &dated.change.item;
-            format!("{} · {} · {}", item.mesh, item.method, item.level)
-        })
-        .text("what", |dated| dated.change.what.clone())
-        .text("change", |dated| [&dated.change.old, &dated.change.new].map(shown).join(" → "))
-        .text("size", |dated| dated.change.relative.map_or(String::new(), percent))
-        .text("", |dated| match (dated.shared, dated.change.meaning) {
-            (true, _) => Cell::from("most series: the machine or the compiler"),
-            (false, Meaning::Regression) => Cell { best: true, ..Cell::from("worse") },
-            (false, _) => Cell::from(""),
-        });
-    Table {
-        caption: format!("{caption}: {}", counted(changes.len(), "change", "changes")),
-        notes: left_out(changes.len(), MOST_ROWS),
-        ..rows.table
-    }
+    Table::of_changes(caption, &changes, |rows| {
+        rows.text("run", |dated| dated.first_after.date.clone())
+            .text("commits", |dated| {
+                format!("{:.8}..{:.8}", dated.last_before.commit, dated.first_after.commit)
+            })
+            .text("series", |dated| {
+                let item = &dated.change.item;
+                format!("{} · {} · {}", item.mesh, item.method, item.level)
+            })
+            .text("what", |dated| dated.change.what.clone())
+            .text("change", |dated| [&dated.change.old, &dated.change.new].map(shown).join(" → "))
+            .text("size", |dated| dated.change.relative.map_or(String::new(), percent))
+            .text("", |dated| match (dated.shared, dated.change.meaning) {
+                (true, _) => Cell::from("most series: the machine or the compiler"),
+                (false, Meaning::Regression) => Cell { best: true, ..Cell::from("worse") },
+                (false, _) => Cell::from(""),
+            })
+    })
 }
 
 /// A share as a change in percent: `+10.3 %`.

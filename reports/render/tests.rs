@@ -113,21 +113,6 @@ fn axis() -> MedialMesh {
 }
 
 #[test]
-fn threads_change_no_byte() {
-    let (surface, axis) = (sphere(1.0, 24), axis());
-    let file = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| {
-            let (colour, _) = ColourBy::Radius.of(&[&axis], 2.0);
-            let layers = vec![Layer::Axis { mesh: &axis, colour }, Layer::Glass(&surface)];
-            let (camera, clear) = (Camera::fitting(&surface), Background::Transparent);
-            picture_from(layers, &camera, &surface, [203, 151], clear).to_png().expect("a file")
-        })
-    };
-    assert!(file(1) == file(4));
-}
-
-#[test]
 fn sheets_curves_and_isolated_spheres_show_inside_glass() {
     let (surface, axis) = (sphere(1.0, 24), axis());
     let layers = vec![Layer::Axis { mesh: &axis, colour: None }, Layer::Glass(&surface)];

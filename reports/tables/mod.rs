@@ -5,7 +5,7 @@ mod csv;
 mod mesh;
 mod topics;
 
-use medial_run::text::{escape_html, printable};
+use medial_run::text::{counted, escape_html, printable};
 use serde::{Serialize, Serializer};
 use serde_json::json;
 
@@ -31,6 +31,20 @@ impl Table {
     pub(crate) fn of<T>(items: &[T]) -> Rows<'_, T> {
         let rows = items.iter().map(|_| vec![]).collect();
         Rows { items, table: Self { rows, ..Self::default() } }
+    }
+
+    /// A table of the first changes, with the number of all, which are in the JSON.
+    pub(crate) fn of_changes<'i, T>(
+        caption: &str,
+        changes: &'i [T],
+        columns: impl FnOnce(Rows<'i, T>) -> Rows<'i, T>,
+    ) -> Self {
+        const MOST: usize = 40;
+        let left = changes.len().saturating_sub(MOST);
+        let notes = (left > 0).then(|| format!("{left} more are in the JSON."));
+        let rows = columns(Table::of(&changes[..changes.len() - left]));
+        let caption = format!("{caption}: {}", counted(changes.len(), "change", "changes"));
+        Self { caption, notes: Vec::from_iter(notes), ..rows.table }
     }
 
     /// The table without rows whose numbers are all unknown, but for that of the first column, and without columns of
@@ -107,12 +121,6 @@ impl<T> Rows<'_, T> {
         rows.table.columns.iter_mut().next_back().expect("just added").number = true;
         rows
     }
-}
-
-/// A note on the rows that a table of `count` changes leaves out.
-pub(crate) fn left_out(count: usize, most: usize) -> Vec<String> {
-    let left = count.saturating_sub(most);
-    (left > 0).then(|| format!("{left} more are in the JSON.")).into_iter().collect()
 }
 
 /// The head of a column.

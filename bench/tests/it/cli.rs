@@ -94,7 +94,7 @@ fn threads_change_no_byte() {
     let reconstruct = |method| {
         format!("reconstruct qmat-1.ma --mesh builtin:blob --tolerance 0.05 --method {method}")
     };
-    let render = "render builtin:blob qmat-1.ma --show error --size 200x150 --tolerance 0.03";
+    let render = "render builtin:blob qmat-1.ma --size 203x151 --background transparent";
     for (name, line) in [
         ("qmat-%.ma", simplify("qmat")),
         ("pmat-%.ma", simplify("pmat")),
@@ -104,7 +104,8 @@ fn threads_change_no_byte() {
         ("lambda-%.ma", simplify("lambda")),
         ("union-%.obj", reconstruct("union")),
         ("crust-%.obj", reconstruct("power-crust")),
-        ("%.png", render.to_owned()),
+        ("axis-%.png", render.to_owned()),
+        ("error-%.png", format!("{render} --show error --tolerance 0.03")),
     ] {
         let written = ["1", "2"].map(|threads| {
             let file = name.replace('%', threads);
