@@ -126,7 +126,7 @@ pub struct PluginError {
 }
 
 /// The wrong bytes of the file, and the reason.
-type Fault = (Option<Range<usize>>, String);
+pub(super) type Fault = (Option<Range<usize>>, String);
 
 fn fault<T>(span: Range<usize>, message: impl Into<String>) -> Result<T, Fault> {
     Err((Some(span), message.into()))
@@ -137,27 +137,15 @@ fn ensure(holds: bool, at: Range<usize>, message: impl Into<String>) -> Result<(
     if holds { Ok(()) } else { fault(at, message) }
 }
 
-/// Reads and checks all plug-ins of a file. `folder` is where its relative paths start, `taken` the
-/// ids of other methods.
-pub(super) fn read(
-    file: &Path,
-    text: &str,
-    folder: &Path,
-    taken: &[&str],
-) -> Result<Vec<Declaration>, PluginError> {
-    read_document(text, folder, taken).map_err(|(span, message)| {
-        let line = span.map(|span| line_of(text, &span));
-        PluginError { file: file.to_owned(), line, message }
-    })
-}
-
 /// Number of the line where a part of a text begins, from 1.
 pub(crate) fn line_of(text: &str, span: &Range<usize>) -> usize {
     let before = text.as_bytes().get(..span.start).unwrap_or_default();
     1 + before.iter().filter(|&&byte| byte == b'\n').count()
 }
 
-fn read_document(text: &str, folder: &Path, taken: &[&str]) -> Result<Vec<Declaration>, Fault> {
+/// Reads and checks all plug-ins of a file. `folder` is where its relative paths start, `taken` the
+/// ids of other methods.
+pub(super) fn read(text: &str, folder: &Path, taken: &[&str]) -> Result<Vec<Declaration>, Fault> {
     // The parser names the unknown key or the missing field, and its place.
     let document: Document =
         toml::from_str(text).map_err(|error| (error.span(), parser_message(error.message())))?;

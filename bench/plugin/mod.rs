@@ -55,8 +55,10 @@ pub fn parse(path: &Path, text: &str, taken: &[&str]) -> Result<Vec<External>, P
     // Absolute, since programs run in this folder, whatever folder we are in by then.
     let absolute = std::path::absolute(path).map_err(|error| refused(path, error))?;
     let folder = absolute.parent().unwrap_or(Path::new("/"));
-    let declarations = declaration::read(path, text, folder, taken)?;
-    let methods = declarations.into_iter().map(External::new);
+    let declarations = declaration::read(text, folder, taken).map_err(|(span, message)| {
+        PluginError { line: span.map(|span| line_of(text, &span)), ..refused(path, message) }
+    });
+    let methods = declarations?.into_iter().map(External::new);
     methods.collect::<Result<_, _>>().map_err(|error| refused(path, error))
 }
 
