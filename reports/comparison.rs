@@ -123,7 +123,9 @@ impl<'a> Comparison<'a> {
         Self {
             meshes: mesh_labels(&mesh_keys.0),
             series: series_labels(&series_keys.0),
-            methods: series_keys.0.iter().map(SeriesKey::described_as).collect(),
+            methods: (series_keys.0.iter())
+                .map(|key| key.variant.filter(|_| key.is_external).unwrap_or(key.method))
+                .collect(),
             levels,
             superseded,
             entries,
@@ -405,11 +407,6 @@ impl<'a> SeriesKey<'a> {
     /// The row as requested, without the build or plug-in that ran it.
     fn request(&self) -> Self {
         Self { build: "", plugin: None, ..self.clone() }
-    }
-
-    /// The id of its [`MethodNote`](crate::MethodNote).
-    fn described_as(&self) -> &'a str {
-        self.variant.filter(|_| self.is_external).unwrap_or(self.method)
     }
 
     fn name(&self) -> String {

@@ -76,7 +76,11 @@ pub struct Journaled {
 }
 
 /// A line that is no record.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {}", match torn {
+    true => "torn by an interrupted write; run its item again".to_owned(),
+    false => format!("not a record: {message}"),
+})]
 pub struct BadLine {
     /// Number of the line, from 1.
     pub line: usize,
@@ -84,16 +88,6 @@ pub struct BadLine {
     pub torn: bool,
     /// The parser's message.
     pub message: String,
-}
-
-impl std::fmt::Display for BadLine {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if self.torn {
-            write!(f, "line {}: torn by an interrupted write; run its item again", self.line)
-        } else {
-            write!(f, "line {}: not a record: {}", self.line, self.message)
-        }
-    }
 }
 
 /// Reads every record of a `results.jsonl`. Other lines are returned as [`BadLine`]s, empty lines are skipped.
