@@ -303,6 +303,8 @@ pub enum Repair {
     WeldedWithin { vertices: usize, distance: f64 },
     /// Plane walls between touching bodies were left out; their two sides were apart by at most a distance in the unit of the file.
     DroppedWalls { faces: usize, distance: f64 },
+    /// Vertices of bodies that stand on each other were moved into the other body, by at most a distance in the unit of the file.
+    PushedVertices { vertices: usize, distance: f64 },
     /// Faces that crossed, overlapped or touched were replaced by the boundary of the region with a winding number of at least 1.
     ResolvedFaces { faces: usize, by: usize },
     /// Short edges of the new faces were contracted; no vertex was moved by more than a distance in the unit of the file.
@@ -343,6 +345,7 @@ impl Repair {
                 | Self::ResolvedFaces { .. }
                 | Self::ContractedEdges { .. }
                 | Self::SeparatedVertices { .. }
+                | Self::PushedVertices { .. }
                 | Self::FilledHole { .. }
                 | Self::Wrapped { .. }
                 | Self::DroppedComponents { .. }
@@ -357,6 +360,7 @@ impl Repair {
             Self::WeldedVertices { vertices }
             | Self::WeldedWithin { vertices, .. }
             | Self::SeparatedVertices { vertices, .. }
+            | Self::PushedVertices { vertices, .. }
             | Self::DroppedUnreferencedVertices { vertices } => (vertices, "vertex"),
             Self::DroppedDegenerateFaces { faces }
             | Self::DroppedWalls { faces, .. }
@@ -411,6 +415,12 @@ impl fmt::Display for Repair {
             }
             Self::WeldedWithin { distance, .. } => {
                 write!(f, "merged {what} within {distance:.1e} of another")
+            }
+            Self::PushedVertices { distance, .. } => {
+                write!(
+                    f,
+                    "pushed touching bodies into each other at {what}, by {distance:.1e} at most"
+                )
             }
             Self::DroppedWalls { distance, .. } => {
                 write!(

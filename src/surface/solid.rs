@@ -9,11 +9,12 @@
 //! 1. *Weld*: vertices within the first of [`TOLERANCES`] that closes the surface, or the next one where 2 to 4 fail.
 //! 2. *Orient*: plane walls between bodies are left out, and bodies that touch taken apart (`parts.rs`). Then they are turned
 //!    outward, or inward where they are cavities.
-//! 3. *Join*: bodies that stand on each other to within rounding (`contacts.rs`).
+//! 3. *Push*: of bodies that stand on each other to within rounding, the smaller one into the larger (`contacts.rs`).
 //! 4. *Resolve*: the winding number, compared with that of the input at points. Repeated while rounding makes faces cross.
 //! 5. *Separate*: parts that touch in a vertex or along an edge.
 
 use std::collections::HashSet;
+use std::panic::catch_unwind;
 
 use manifold_rust::linalg;
 use manifold_rust::robust::assemble::assemble;
@@ -22,7 +23,7 @@ use manifold_rust::robust::intersection_graph::build_graph;
 use manifold_rust::types::{OpType, WindingRule};
 
 use super::check::orient_and_examine;
-use super::contacts::{Contact, contacts};
+use super::contacts;
 use super::intersections::intersections;
 use super::mend::separate;
 use super::mesh::{TriMesh, Unit};
@@ -110,28 +111,13 @@ fn resolved(
     });
     repairs.extend(weld.into_iter().chain(walls).chain(turns));
     let replaced = mesh.faces.len();
-    let (mut scaled, contacts) = contacts_of(&mesh, unit);
-    let is_joined = !contacts.is_empty();
-    for contact in contacts {
-        let level = contact.level(&scaled);
-        let [_, whole] = arranged(&level, Unit::of(&level.vertices))?;
-        scaled = contact.back(whole);
+    if let Some((found, push)) = pushed_together(&mesh, unit) {
+        mesh = found;
+        repairs.push(push);
     }
-    if is_joined {
-        scaled.vertices.iter_mut().for_each(|v| *v = unit.restore(*v));
-        if !is_region(&scaled, &mesh, unit) {
-            return None;
-        }
-        mesh = scaled;
-    }
-    let replacement = |found: &Inspection| {
-        let by = found.mesh.faces.len();
-        is_joined.then_some(Repair::ResolvedFaces { faces: replaced, by })
-    };
-    // A weld or a join may have been all that was missing.
+    // A weld may have been all that was missing.
     let found = examined(&mesh)?;
     if is_solid(&found) {
-        repairs.extend(replacement(&found));
         return Some(loaded(found, repairs));
     }
     let is_wall = |repair: &Repair| matches!(repair, Repair::DroppedDuplicateFaces { .. });
@@ -141,7 +127,7 @@ fn resolved(
         let separated = separate(&mut vertices, &mut faces);
         let found = examined(&TriMesh { vertices, faces })?;
         if is_solid(&found) {
-            repairs.extend(replacement(&found).into_iter().chain(separated));
+            repairs.extend(separated);
             return Some(loaded(found, repairs));
         }
     }
@@ -226,15 +212,28 @@ fn reaches(found: &TriMesh, whole: &TriMesh) -> bool {
 
 /// Whether bodies stand on each other in planes that rounding has parted.
 pub(super) fn has_contacts(mesh: &TriMesh, unit: Unit) -> bool {
-    !contacts_of(mesh, unit).1.is_empty()
+    let (scaled, most) = scaled(mesh, unit);
+    contacts::has_contacts(&scaled, most)
 }
 
-/// The surface in scaled units, and those planes of it.
-fn contacts_of(mesh: &TriMesh, unit: Unit) -> (TriMesh, Vec<Contact>) {
+/// The surface with such bodies pushed into each other, also those with common vertices.
+fn pushed_together(mesh: &TriMesh, unit: Unit) -> Option<(TriMesh, Repair)> {
+    let (mut scaled, most) = scaled(mesh, unit);
+    if let Some(Parted { faces, vertices, .. }) = parted(&scaled.vertices, &scaled.faces) {
+        let vertices = vertices.into_iter().map(|v| scaled.vertices[v as usize]).collect();
+        scaled = TriMesh { vertices, faces };
+    }
+    let (mut mesh, vertices, distance) = contacts::pushed(&scaled, most)?;
+    mesh.vertices.iter_mut().for_each(|v| *v = unit.restore(*v));
+    let distance = unit.backward(distance, 1).unwrap_or_default();
+    Some((mesh, Repair::PushedVertices { vertices, distance }))
+}
+
+/// The surface in scaled units, with the distance of bodies that stand on each other.
+fn scaled(mesh: &TriMesh, unit: Unit) -> (TriMesh, f64) {
     let scaled = TriMesh { vertices: unit.forward_all(&mesh.vertices), faces: mesh.faces.clone() };
     let extent = scaled.bounding_box().map_or(0.0, |(low, high)| (high - low).length());
-    let contacts = contacts(&scaled, WALL * extent);
-    (scaled, contacts)
+    (scaled, WALL * extent)
 }
 
 /// Whether `found` bounds the region where the winding number of `surface` is at least 1, by points beside the faces of
@@ -403,10 +402,15 @@ fn arranged(mesh: &TriMesh, unit: Unit) -> Option<[TriMesh; 2]> {
         })
     };
     let triangles: Vec<_> = (0..mesh.faces.len()).map(triangle).collect();
-    let graph = build_graph(&triangles, &[]);
-    let complex = build_cells(&graph);
-    let windings = windings(&graph, &complex, [&triangles, &[]]);
-    let pieces = extract(&graph, &complex, &windings, OpType::Add, WindingRule::Positive);
+    // The library panics where faces in one plane to within rounding leave it no way to find a side.
+    let (graph, pieces) = catch_unwind(|| {
+        let graph = build_graph(&triangles, &[]);
+        let complex = build_cells(&graph);
+        let windings = windings(&graph, &complex, [&triangles, &[]]);
+        let pieces = extract(&graph, &complex, &windings, OpType::Add, WindingRule::Positive);
+        (graph, pieces)
+    })
+    .ok()?;
 
     let position = |[x, y, z]: [f64; 3]| unit.restore(Vec3::new(x, y, z));
     let simple =

@@ -368,6 +368,77 @@ fn bodies_that_stand_on_each_other_at_an_angle_are_joined() {
     }
 }
 
+/// A prism over a regular polygon, or a square plate with the polygon as a hole.
+fn prism(sides: u32, radius: f64, [low, high]: [f64; 2], is_hole: bool) -> TriMesh {
+    let corner = |k: u32| {
+        let (sin, cos) = (TAU * (f64::from(k) + 0.5) / f64::from(sides)).sin_cos();
+        [cos, sin]
+    };
+    let ring = |z: f64| (0..sides).map(corner).map(move |[x, y]| [radius * x, radius * y, z]);
+    // Corners of the square in the directions of those of the polygon.
+    let square = |z: f64| {
+        (0..sides).map(corner).map(move |[x, y]| {
+            let scale = 3.0 / x.abs().max(y.abs());
+            [scale * x, scale * y, z]
+        })
+    };
+    let rings = ring(low).chain(ring(high));
+    let vertices: Vec<Vec3> = match is_hole {
+        true => rings.chain(square(low)).chain(square(high)).map(Vec3::from).collect(),
+        false => rings.chain([[0.0, 0.0, low], [0.0, 0.0, high]]).map(Vec3::from).collect(),
+    };
+    let mut faces = Vec::new();
+    for k in 0..sides {
+        let [a, b] = [k, (k + 1) % sides];
+        let [c, d, e, f] = [a + sides, b + sides, a + 2 * sides, b + 2 * sides];
+        if is_hole {
+            let [g, h] = [e + sides, f + sides];
+            for [p, q, r, s] in [[b, a, c, d], [e, f, h, g], [c, g, h, d], [a, b, f, e]] {
+                faces.extend([[p, q, r], [p, r, s]]);
+            }
+        } else {
+            let [low, high] = [2 * sides, 2 * sides + 1];
+            faces.extend([[a, b, d], [a, d, c], [low, b, a], [high, c, d]]);
+        }
+    }
+    TriMesh { vertices, faces }
+}
+
+#[test]
+fn pins_in_holes_at_an_angle_are_joined() {
+    let mut random = Pcg64::seed_from_u64(23);
+    let base = |sides: u32| 0.5 * f64::from(sides) * (TAU / f64::from(sides)).sin();
+    for sides in [8, 16, 24, 36] {
+        // Half way in, through, flush at one side, flush at both.
+        for depth in [[0.5, 2.0], [-1.0, 2.0], [0.0, 2.0], [0.0, 1.0]] {
+            let plate = prism(sides, 1.0, [0.0, 1.0], true);
+            let pin = prism(sides, 1.0, depth, false);
+            let outer = base(sides);
+            let square: f64 = plate
+                .faces
+                .iter()
+                .map(|face| {
+                    let [a, b, c] = face.map(|v| plate.vertices[v as usize]);
+                    a.dot(b.cross(c)) / 6.0
+                })
+                .sum();
+            let volume = square + outer * (depth[1] - depth[0]);
+            let whole = joined(&[plate, pin]);
+            for _ in 0..4 {
+                let axis = Vec3::from([(); 3].map(|()| random.random_range(-1.0..1.0))).normalize();
+                let turn = DMat3::from_axis_angle(axis, random.random_range(0.0..TAU));
+                let report = read(&moved(whole.clone(), |v| turn * v)).report;
+                assert_eq!(report.expected_betti, Some([1, 0, 0]), "{sides} {depth:?}: {report:?}");
+                let found = report.volume.expect("closed");
+                assert!(
+                    (found - volume).abs() < 1e-4 * volume,
+                    "{sides} {depth:?}: {found} for {volume}"
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn thin_and_distant_plates_are_kept() {
     let cube = cuboid(Vec3::splat(-0.5), Vec3::splat(0.5));
