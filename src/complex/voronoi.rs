@@ -168,6 +168,16 @@ impl CellSpheres {
         moved.map_or(self.circumspheres[cell.index()], |place| Some(self.moved[place].1))
     }
 
+    /// For each point of the triangulation whether it is on a circumsphere of the medial mesh.
+    pub fn touched(&self, delaunay: &Delaunay) -> Vec<bool> {
+        let mut is_touched = vec![false; delaunay.point_count()];
+        let is_moved = |cell| self.moved.binary_search_by_key(&cell, |&(cell, _)| cell).is_ok();
+        for &cell in self.kept.iter().filter(|&&cell| !is_moved(cell)) {
+            delaunay.vertices(cell).iter().for_each(|v| is_touched[v.index()] = true);
+        }
+        is_touched
+    }
+
     /// The circumspheres of all finite cells, those centred outside included, see
     /// [`Delaunay::circumspheres`].
     pub fn circumspheres(&self) -> &[Option<Sphere>] {

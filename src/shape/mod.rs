@@ -18,15 +18,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
 use crate::complex::{
-    CellSpheres, ComplexError, Conforming, ConformingError, DualTriangulation, MedialMesh, Sphere,
-    VoronoiFacets, voronoi_medial_mesh,
+    CellSpheres, ComplexError, Conforming, ConformingError, DualTriangulation, MedialMesh,
+    MedialUnion, Sphere, VoronoiFacets, voronoi_medial_mesh,
 };
 use crate::diagnostics::Diagnostics;
 use crate::geometry::{Delaunay, TriangulationError, VertexId};
 use crate::heap::{Usage, usage_apart, usage_of};
 use crate::metrics::{Judge, JudgeOptions, Truth};
 use crate::surface::{
-    BvhError, InsideTest, Normalisation, Sampling, SurfaceReport, TriMesh, TriangleBvh, sample,
+    BvhError, InsideTest, Normalisation, PointGrid, Sampling, SurfaceReport, TriMesh, TriangleBvh,
+    sample,
 };
 
 pub use balls::{ContactSets, InnerBalls, PolarBalls};
@@ -112,11 +113,8 @@ impl Triangulated {
         least: usize,
     ) -> Result<Self, TriangulationError> {
         let begin = mesh.vertices.len().max(least);
-        // Any number where it is not known.
-        let [parts, _, cavities] = report.expected_betti.unwrap_or([usize::MAX - 1; 3]);
-        let parts = [parts, cavities];
         let found = match report.intersecting_pairs {
-            0 => Conforming::new(mesh, begin, (8 * begin).max(LEAST_BUDGET), parts),
+            0 => Conforming::new(mesh, begin, (8 * begin).max(LEAST_BUDGET), report.expected_betti),
             // No refinement would end.
             _ => Err(ConformingError::Crossing),
         };
@@ -511,6 +509,12 @@ impl Shape {
                 "spheres of the initial medial mesh reach {percent:.1} % of the diagonal beyond the surface; {ADVICE}"
             )
         }));
+        remarks.extend(self.bareness().map(|distance| {
+            let percent = 100.0 * distance;
+            format!(
+                "parts of the surface are up to {percent:.1} % of the diagonal away from the initial medial mesh; {ADVICE}"
+            )
+        }));
         remarks
     }
 
@@ -528,6 +532,27 @@ impl Shape {
         };
         let parts = start.spheres.par_chunks(REACH_CHUNK).map(deepest);
         Some(parts.reduce(|| 0.0, f64::max))
+    }
+
+    /// Largest distance of a sample from the conforming medial mesh, as a fraction of the diagonal, if it is above
+    /// [`FAR_START`].
+    fn bareness(&self) -> Option<f64> {
+        let Sampling::Conforming { .. } = self.options().sampling else { return None };
+        let OfSamples { medial, delaunay, cells, .. } = &self.store.of_samples;
+        let start = medial.get()?.0.as_ref().ok()?;
+        let delaunay = &delaunay.get()?.0.as_ref().ok()?.delaunay;
+        let is_touched = cells.get()?.0.as_ref().ok()?.touched(delaunay);
+        let points = || (0..).zip(&is_touched).map(|(v, &is)| (delaunay.point(VertexId(v)), is));
+        let mut near = PointGrid::new(FAR_START);
+        points().filter(|&(_, is_touched)| is_touched).for_each(|(p, _)| near.insert(p));
+        let bare = points().filter(|&(p, is)| !is && !near.any_within(p, FAR_START));
+        let bare: Vec<Vec3> = bare.map(|(p, _)| p).collect();
+        if bare.is_empty() {
+            return None;
+        }
+        let union = MedialUnion::new(start).ok()?;
+        let farthest = union.signed_batch(&bare).into_iter().fold(0.0, f64::max);
+        (farthest > FAR_START).then_some(farthest)
     }
 
     fn triangulated(&self) -> Result<Arc<Triangulated>, ShapeError> {

@@ -188,6 +188,51 @@ fn starts_of_thin_walls_side_by_side_are_close_to_them() {
     }
 }
 
+#[test]
+fn starts_of_blades_and_needles_reach_their_tips() {
+    let tetrahedron = |b: [f64; 3], c: [f64; 3], d: [f64; 3]| {
+        let vertices = [[0.0; 3], b, c, d].map(Vec3::from).to_vec();
+        TriMesh { vertices, faces: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] }
+    };
+    let blade = |height: f64| tetrahedron([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.3, 0.3, height]);
+    let needle = |width: f64| tetrahedron([width, 0.0, 0.0], [0.0, width, 0.0], [0.0, 0.0, 1.0]);
+    let tips = [0.01, 0.1].map(blade).into_iter().chain([0.001, 0.03, 0.1].map(needle));
+    for (k, solid) in tips.enumerate() {
+        let (_, start) = right_start("tips", &solid);
+        let shape = shape_of(&solid, Sampling::default());
+        let far = error_of(&shape, &start);
+        assert!(far < 0.02, "solid {k}: {far}");
+    }
+}
+
+#[test]
+fn a_start_that_leaves_parts_bare_is_named() {
+    // A needle in pieces that are too short for a coarse surface.
+    let rings: Vec<Vec3> = (0..15)
+        .flat_map(|k| {
+            let (z, width) = (f64::from(k) / 15.0, 1e-3 * (1.0 - f64::from(k) / 15.0));
+            [[0.0, 0.0], [width, 0.0], [0.0, width]].map(|[x, y]| Vec3::new(x, y, z))
+        })
+        .chain([Vec3::Z])
+        .collect();
+    let ring = |k: u32| {
+        [[0, 1], [1, 2], [2, 0]].into_iter().flat_map(move |[a, b]| {
+            let [a, b] = [a + 3 * k, b + 3 * k];
+            [[a, b, b + 3], [a, b + 3, a + 3]]
+        })
+    };
+    let tip = [[42, 43, 45], [43, 44, 45], [44, 42, 45]];
+    let faces = (0..14).flat_map(ring).chain(tip).chain([[0, 2, 1]]).collect();
+    let solid = TriMesh { vertices: rings, faces };
+    let shape = shape_of(&solid, Sampling::default());
+    let start = shape.initial().unwrap();
+    let far = error_of(&shape, &start);
+    let remarks = shape.remarks();
+    let is_named =
+        remarks.iter().any(|remark| remark.contains("away from the initial medial mesh"));
+    assert_eq!(is_named, far > 0.02, "{far}: {remarks:?}");
+}
+
 /// The two-sided Hausdorff error of a start.
 fn error_of(shape: &Shape, start: &MedialMesh) -> f64 {
     let (tree, inside) = (shape.surface_tree().unwrap(), shape.inside_test());

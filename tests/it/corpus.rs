@@ -1,7 +1,8 @@
 //! Every mesh and every bad file of the shared collection, where it is present.
 
 use medial::complex::{self, MaErrorKind};
-use medial::surface::{self, Fault, Repair};
+use medial::shape::{Shape, ShapeOptions};
+use medial::surface::{self, Fault, Loaded, Repair};
 use medial_test_support::{free_meshes, medial_meshes, table};
 
 #[test]
@@ -37,6 +38,19 @@ fn good_meshes_match_the_manifest() {
         // Reading guarantees all that checking demands.
         let checked = surface::validate(&loaded.mesh).unwrap();
         assert_eq!(checked, *r);
+    }
+}
+
+#[test]
+fn starts_of_hard_surfaces_have_the_topology_of_the_solid() {
+    let Some(folder) = medial_test_support::meshes() else { return };
+    let folder = folder.join("hard");
+    for row in table(&folder.join("MANIFEST.csv")) {
+        let file = &row["file"];
+        let Loaded { mesh, report } = surface::read(folder.join(file)).unwrap();
+        let shape = Shape::new(file, &mesh, report, ShapeOptions::default()).unwrap();
+        let start = shape.initial().unwrap();
+        assert_eq!(Some(complex::betti(&start)), shape.expected_betti(), "{file}");
     }
 }
 

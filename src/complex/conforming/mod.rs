@@ -31,7 +31,10 @@
 //!    a flood through facets that are not on the surface. Flat cells with two facets in a patch are taken off.
 //! 6. A ball of a cell inside that reaches far beyond the surface, between vertices far apart, loses its place to the
 //!    surface point nearest to its centre. So does the circle in which a ball that is centred beyond a plane meets it, where the
-//!    solid is thinner than the samples are apart. Then 1 to 5 follow again.
+//!    solid is thinner than the samples are apart. On coarse surfaces edges are halved at vertices that no ball is near, as
+//!    at the tips of needles. Then 1 to 5 follow again.
+//! 7. Where triangles stay missing, winding numbers tell inside from outside, and cells change sides until the numbers of
+//!    parts, loops and cavities are the solid's (file `specks.rs`).
 //!
 //! # Deviations from the papers
 //! The papers keep the surface and flip nothing between patches. On twelve real meshes flips leave a ninth of the
@@ -45,16 +48,17 @@ mod flips;
 mod protrusions;
 mod refine;
 mod skin;
+mod specks;
 mod stars;
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::HashSet;
 
 use skin::Skin;
 use stars::Stars;
 
 use crate::Vec3;
 use crate::geometry::triangulation::Facet;
-use crate::geometry::{CellId, Delaunay, DisjointSets, TriangulationError};
+use crate::geometry::{CellId, Delaunay, TriangulationError};
 use crate::surface::{InsideTest, Normalisation, Side, TriMesh, TriangleBvh};
 
 /// Limit of rounds of refinement.
@@ -138,7 +142,7 @@ pub enum ConformingError {
 impl Conforming {
     /// Halves the longest edges of a closed, oriented surface until it has `least` points. Then refines it until the
     /// Delaunay triangulation contains it, and until the balls of its cells end near the surface; no round of that
-    /// begins after `most` points were added. `parts` are the numbers of parts and cavities of the solid. The same result for any number of threads. Cost: `O(n log n)` expected,
+    /// begins after `most` points were added. `betti` are the solid's Betti numbers, where they are known. The same result for any number of threads. Cost: `O(n log n)` expected,
     /// and `O(n)` for each round.
     ///
     /// # Errors
@@ -151,7 +155,7 @@ impl Conforming {
         surface: &TriMesh,
         least: usize,
         most: usize,
-        parts: [usize; 2],
+        betti: Option<[usize; 3]>,
     ) -> Result<Self, ConformingError> {
         let delaunay = Delaunay::new(&surface.vertices)?;
         let mut kept: Option<Refinement> = None;
@@ -163,7 +167,7 @@ impl Conforming {
                 continue;
             }
             let mut refinement =
-                Refinement::new(surface, delaunay.clone(), [least, most], parts, way)?;
+                Refinement::new(surface, delaunay.clone(), [least, most], betti, way)?;
             let missing = refinement.skin.missing(&refinement.delaunay);
             match refinement.conform(missing, None) {
                 Ok(()) => {
@@ -225,8 +229,8 @@ struct Refinement {
     begin: usize,
     /// Limit of points that are added in rounds.
     most: usize,
-    /// Numbers of parts and cavities of the solid.
-    parts: [usize; 2],
+    /// Betti numbers of the solid, where they are known.
+    betti: Option<[usize; 3]>,
     rounds: usize,
 }
 
@@ -242,7 +246,7 @@ impl Refinement {
         surface: &TriMesh,
         mut delaunay: Delaunay,
         [least, most]: [usize; 2],
-        parts: [usize; 2],
+        betti: Option<[usize; 3]>,
         way: Way,
     ) -> Result<Self, ConformingError> {
         let mut skin = Skin::new(surface, &delaunay, way.flat)?;
@@ -261,22 +265,24 @@ impl Refinement {
             missing: Vec::new(),
             begin,
             most,
-            parts,
+            betti,
             rounds: 0,
         })
     }
 
     fn finish(self) -> Conforming {
-        let Self { vertices, skin, delaunay, is_inside, rounds, missing, .. } = self;
+        let Self { vertices, skin, delaunay, mut is_inside, rounds, missing, betti, .. } = self;
+        if let Some(betti) = betti {
+            specks::mend_loops(&delaunay, &mut is_inside, &skin, &missing, betti);
+        }
         let added = skin.points.len() - vertices;
         Conforming { delaunay, is_inside, added, rounds, missing: missing.len() }
     }
 
-    /// Step 6: adds points until all balls end near the surface and, if it `keeps_gaps`, close none, or the limit is reached. A
-    /// round that gives up patches is
-    /// undone, and no point is added again near those of its points that are next to a triangle that stayed missing: at
+    /// Step 6: adds points until all balls end near the surface or the limit is reached; on coarse surfaces also until they
+    /// close no gap, and none of its vertices is far from them. A round that gives up patches is undone, and no point is added again near those of its points that are next to a triangle that stayed missing: at
     /// twice the distance each time.
-    fn approach(&mut self, surface: &TriangleBvh, keeps_gaps: bool) {
+    fn approach(&mut self, surface: &TriangleBvh, is_coarse: bool) {
         let closest = CLOSE * self.skin.diagonal;
         let mut closed: Vec<(Vec3, f64)> = Vec::new();
         let mut distance = closest;
@@ -284,7 +290,10 @@ impl Refinement {
             let give_ups = self.give_ups + 1;
             let way = Way { bends: false, give_ups, rounds: ROUNDS, ..self.way };
             let mut next = Self { way, ..self.clone() };
-            next.split_protrusions(CLOSE, surface, &closed, keeps_gaps);
+            next.split_protrusions(CLOSE, surface, &closed, is_coarse);
+            if is_coarse {
+                next.split_at_bare_vertices(CLOSE, surface, &closed);
+            }
             let (before, after) = (self.skin.points.len(), next.skin.points.len());
             if before == after || after - self.begin >= self.most {
                 return;
@@ -340,7 +349,9 @@ impl Refinement {
                     0 => skin.label(&self.delaunay)?,
                     _ => self.winding(),
                 };
-                join_specks(&self.delaunay, &mut self.is_inside, self.parts);
+                if let Some(betti) = self.betti {
+                    specks::join(&self.delaunay, &mut self.is_inside, betti);
+                }
                 self.missing = missing;
                 return Ok(());
             }
@@ -392,42 +403,6 @@ impl Refinement {
         let mut suspects = self.skin.with_changed(missing);
         suspects.extend(self.skin.near_new(first, &self.delaunay));
         Ok(self.skin.missing_among(suspects, &self.delaunay))
-    }
-}
-
-/// Joins the parts and cavities beyond the numbers of the solid with their surroundings, those of least volume: missing
-/// triangles and degenerate places leave such.
-fn join_specks(delaunay: &Delaunay, is_inside: &mut [bool], [parts, cavities]: [usize; 2]) {
-    let inside = |cell: CellId| is_inside.get(cell.index()).is_some_and(|&inside| inside);
-    let mut sets = DisjointSets::singletons(delaunay.cell_count());
-    for cell in delaunay.cells() {
-        for other in delaunay.neighbours(cell) {
-            if inside(cell) == inside(other) {
-                sets.join(cell.0, other.0);
-            }
-        }
-    }
-    let mut volumes: BTreeMap<u32, f64> = BTreeMap::new();
-    for cell in delaunay.cells() {
-        let volume = match delaunay.is_infinite(cell) {
-            true => f64::INFINITY,
-            false => {
-                let [a, b, c, d] = delaunay.vertices(cell).map(|v| delaunay.point(v));
-                (b - a).cross(c - a).dot(d - a).abs()
-            }
-        };
-        *volumes.entry(sets.find(cell.0)).or_default() += volume;
-    }
-    let mut specks = HashSet::new();
-    // With the outside itself.
-    for (is_part, number) in [(true, parts), (false, cavities + 1)] {
-        let regions = volumes.iter().filter(|&(&cell, _)| inside(CellId(cell)) == is_part);
-        let mut regions: Vec<(f64, u32)> = regions.map(|(&cell, &volume)| (volume, cell)).collect();
-        regions.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        specks.extend(regions.iter().skip(number).map(|&(_, cell)| cell));
-    }
-    for cell in delaunay.finite_cells() {
-        is_inside[cell.index()] ^= specks.contains(&sets.find(cell.0));
     }
 }
 

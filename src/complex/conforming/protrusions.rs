@@ -73,6 +73,81 @@ impl Refinement {
         self.skin.move_to(surface, first);
     }
 
+    /// Halves edges of the surface at vertices that no ball is near, until these are closer than a fraction of the diagonal:
+    /// those of blades and needles, whose cells have no centre inside.
+    pub fn split_at_bare_vertices(
+        &mut self,
+        depth: f64,
+        surface: &TriangleBvh,
+        closed: &[(Vec3, f64)],
+    ) {
+        let first = self.skin.points.len();
+        let depth = depth * self.skin.diagonal;
+        let is_bare = self.bare_vertices(depth);
+        let skin = &mut self.skin;
+        let ends = |[a, b]: [u32; 2]| (skin.points[a as usize], skin.points[b as usize]);
+        let all = skin.triangles.iter().flat_map(|&t| sides(t)).filter(|[a, b]| a < b);
+        let mut edges: Vec<(f64, [u32; 2])> = all
+            .filter(|edge| edge.iter().any(|&v| is_bare[v as usize]))
+            .map(|edge| (ends(edge).0.distance(ends(edge).1), edge))
+            .filter(|&(length, _)| length > depth)
+            .collect();
+        edges.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        for (_, edge) in edges {
+            let [a, b] = edge.map(|v| skin.points[v as usize]);
+            let at = a.midpoint(b);
+            // Splits of this round can have flipped it.
+            if skin.across.contains_key(&key(edge))
+                && !closed.iter().any(|(place, radius)| place.distance(at) < *radius)
+            {
+                skin.split_edge(edge, at);
+            }
+        }
+        skin.move_to(surface, first);
+    }
+
+    /// For each point whether it is farther than a distance from all corners of cells that are centred inside, and from the
+    /// centroids of its cells.
+    fn bare_vertices(&self, depth: f64) -> Vec<bool> {
+        let Self { skin, delaunay, is_inside, .. } = self;
+        let cells = delaunay.finite_cells().filter(|cell| is_inside[cell.index()]);
+        let centred = cells.map(|cell| {
+            let corners = delaunay.vertices(cell).map(|v| delaunay.point(v));
+            let centroid = corners.into_iter().sum::<Vec3>() / 4.0;
+            (
+                cell,
+                delaunay.circumsphere(cell).map_or(Vec3::INFINITY, |(centre, _)| centre),
+                centroid,
+            )
+        });
+        let cells: Vec<(CellId, Vec3, Vec3)> = centred.collect();
+        let mesh = TriMesh { vertices: skin.points.clone(), faces: skin.triangles.clone() };
+        let centres: Vec<Vec3> = cells.iter().map(|&(_, centre, _)| centre).collect();
+        let sides = InsideTest::new(&mesh).sides(&centres);
+        // No cell of a vertex that was merged with another one has it as a corner.
+        let mut is_bare = vec![false; skin.points.len()];
+        let mut grid = PointGrid::new(depth);
+        let all = || cells.iter().zip(&sides);
+        let corners = |cell: CellId| delaunay.vertices(cell).map(|v| v.index());
+        for ((cell, ..), _) in all() {
+            corners(*cell).into_iter().for_each(|v| is_bare[v] = true);
+        }
+        for ((cell, ..), _) in all().filter(|(_, side)| **side == Side::Inside) {
+            for v in corners(*cell) {
+                if std::mem::take(&mut is_bare[v]) {
+                    grid.insert(skin.points[v]);
+                }
+            }
+        }
+        for ((cell, _, centroid), _) in all() {
+            for v in corners(*cell) {
+                is_bare[v] &= skin.points[v].distance(*centroid) > depth;
+            }
+        }
+        let points = is_bare.iter().zip(&skin.points);
+        points.map(|(&is_bare, &p)| is_bare && !grid.any_within(p, depth)).collect()
+    }
+
     /// Whether a ball reaches over a third of the way to another part of the surface: together with that of the other side it
     /// would close the gap, however deep that is.
     fn closes_gap(&self, ball: &Protrusion, surface: &TriangleBvh) -> bool {

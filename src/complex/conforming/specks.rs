@@ -1,0 +1,329 @@
+//! Parts, cavities and loops that missing triangles leave among the cells of a solid.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+
+use super::skin::{Skin, key};
+use super::stars::star;
+use crate::geometry::triangulation::Facet;
+use crate::geometry::{CellId, Delaunay, DisjointSets, VertexId};
+
+/// Limit of the moves that are tried; each counts the regions of all cells.
+const TRIALS: usize = 2_000;
+
+/// Joins the parts and cavities beyond the numbers of the solid with their surroundings, those of least volume: missing
+/// triangles and degenerate places leave such.
+pub(super) fn join(delaunay: &Delaunay, is_inside: &mut [bool], [parts, _, cavities]: [usize; 3]) {
+    let mut sets = regions(delaunay, is_inside);
+    let mut volumes: BTreeMap<u32, f64> = BTreeMap::new();
+    for cell in delaunay.cells() {
+        *volumes.entry(sets.find(cell.0)).or_default() += volume(delaunay, cell);
+    }
+    let mut specks = HashSet::new();
+    // With the outside itself.
+    for (is_part, number) in [(true, parts), (false, cavities + 1)] {
+        let regions =
+            volumes.iter().filter(|&(&cell, _)| inside(is_inside, CellId(cell)) == is_part);
+        let mut regions: Vec<(f64, u32)> = regions.map(|(&cell, &volume)| (volume, cell)).collect();
+        regions.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        specks.extend(regions.iter().skip(number).map(|&(_, cell)| cell));
+    }
+    for cell in delaunay.finite_cells() {
+        is_inside[cell.index()] ^= specks.contains(&sets.find(cell.0));
+    }
+}
+
+/// Moves cells at missing triangles to the other side until the Euler characteristic of the cells inside is that of the
+/// solid. Parts and cavities stay as many as they are, so that the number of loops becomes the solid's as well.
+pub(super) fn mend_loops(
+    delaunay: &Delaunay,
+    is_inside: &mut [bool],
+    skin: &Skin,
+    missing: &[u32],
+    [parts, loops, cavities]: [usize; 3],
+) {
+    let wanted = (parts + cavities) as i64 - loops as i64;
+    if missing.is_empty() || numbers(delaunay, is_inside) != [parts, cavities + 1] {
+        return;
+    }
+    let excess = euler(delaunay, is_inside) - wanted;
+    let at_missing = cells_at(delaunay, skin, missing);
+    let beyond = cells_beside(delaunay, is_inside, skin);
+    let numbers = [parts, cavities + 1];
+    let mut mending = Mending { delaunay, is_inside, numbers, excess, trials: TRIALS };
+    for cells in [at_missing, beyond] {
+        mending.mend_all(&by_volume(delaunay, cells));
+    }
+}
+
+/// Cells with a side of one of some triangles.
+fn cells_at(delaunay: &Delaunay, skin: &Skin, triangles: &[u32]) -> Vec<CellId> {
+    let corners = triangles.iter().map(|&t| skin.triangles[t as usize]);
+    let found = corners.flat_map(|corners| {
+        let around = corners.into_iter().flat_map(|v| star(delaunay, v));
+        around.filter(move |&cell| {
+            let own = delaunay.vertices(cell);
+            corners.iter().filter(|&&v| own.contains(&VertexId(v))).count() >= 2
+        })
+    });
+    found.filter(|&cell| !delaunay.is_infinite(cell)).collect()
+}
+
+/// Cells on the two sides of facets between inside and outside that are no triangles of the surface.
+fn cells_beside(delaunay: &Delaunay, is_inside: &[bool], skin: &Skin) -> Vec<CellId> {
+    let is_of_surface = |facet| {
+        let [a, b, c] = delaunay.facet_vertices(facet).map(|v| v.0);
+        let t = skin.across.get(&key([a, b]));
+        t.is_some_and(|&t| skin.triangles[t as usize].contains(&c))
+    };
+    let facets = delaunay
+        .finite_cells()
+        .filter(|cell| is_inside[cell.index()])
+        .flat_map(|cell| (0..4).map(move |opposite| Facet { cell, opposite }));
+    let pairs = facets.map(|facet| (facet, delaunay.mirror(facet).cell));
+    let doubtful =
+        pairs.filter(|&(facet, other)| !inside(is_inside, other) && !is_of_surface(facet));
+    let cells = doubtful.flat_map(|(facet, other)| [facet.cell, other]);
+    cells.filter(|&cell| !delaunay.is_infinite(cell)).collect()
+}
+
+/// Cells, each once, those of least volume first.
+fn by_volume(delaunay: &Delaunay, cells: Vec<CellId>) -> Vec<CellId> {
+    let mut cells: Vec<(f64, CellId)> =
+        cells.into_iter().map(|cell| (volume(delaunay, cell), cell)).collect();
+    cells.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    cells.dedup();
+    cells.into_iter().map(|(_, cell)| cell).collect()
+}
+
+/// Cells of a solid whose loops are mended.
+struct Mending<'m> {
+    delaunay: &'m Delaunay,
+    is_inside: &'m mut [bool],
+    /// Numbers of regions inside and outside, which stay.
+    numbers: [usize; 2],
+    /// The Euler characteristic of the cells inside less that of the solid.
+    excess: i64,
+    /// Trials that are left.
+    trials: usize,
+}
+
+impl Mending<'_> {
+    /// Moves some of the cells until the Euler characteristic is right, or no cell brings it closer.
+    fn mend_all(&mut self, cells: &[CellId]) {
+        while self.excess != 0 && (self.mend(cells) || self.mend_beyond(cells)) {}
+    }
+
+    /// Moves the first of some cells that bring the Euler characteristic closer to the solid's. Whether there is one.
+    fn mend(&mut self, cells: &[CellId]) -> bool {
+        for &cell in cells {
+            let effect = self.effect(cell);
+            if (self.excess + effect).abs() < self.excess.abs()
+                && self.has_both_sides(cell)
+                && self.trials > 0
+            {
+                self.trials -= 1;
+                self.is_inside[cell.index()] ^= true;
+                if numbers(self.delaunay, self.is_inside) == self.numbers {
+                    self.excess += effect;
+                    return true;
+                }
+                self.is_inside[cell.index()] ^= true;
+            }
+        }
+        false
+    }
+
+    /// Moves cells that change no homotopy type until one next to them can be mended, and those back that were not needed.
+    fn mend_beyond(&mut self, cells: &[CellId]) -> bool {
+        let delaunay = self.delaunay;
+        let rank: HashMap<CellId, usize> = cells.iter().copied().zip(0..).collect();
+        let near = |cell: CellId| {
+            let around = delaunay.vertices(cell).into_iter().flat_map(|v| star(delaunay, v.0));
+            let ranks: BTreeSet<usize> = around.filter_map(|c| rank.get(&c).copied()).collect();
+            ranks.into_iter().map(|rank| cells[rank]).collect::<Vec<CellId>>()
+        };
+        for side in [true, false] {
+            let mut moved = Vec::new();
+            let mut is_mended = false;
+            'rounds: loop {
+                let before = moved.len();
+                for &cell in cells {
+                    if self.is_inside[cell.index()] == side && self.is_simple(cell) {
+                        self.is_inside[cell.index()] ^= true;
+                        moved.push(cell);
+                        is_mended = self.mend(&near(cell));
+                        if is_mended {
+                            break 'rounds;
+                        }
+                    }
+                }
+                if moved.len() == before {
+                    break;
+                }
+            }
+            for &cell in moved.iter().rev() {
+                if !is_mended || self.is_inside[cell.index()] != side && self.is_simple(cell) {
+                    self.is_inside[cell.index()] = side;
+                }
+            }
+            if is_mended {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// What moving a cell to the other side adds to the Euler characteristic.
+    fn effect(&self, cell: CellId) -> i64 {
+        let sign = if self.is_inside[cell.index()] { -1 } else { 1 };
+        sign * effect(self.delaunay, self.is_inside, cell)
+    }
+
+    fn has_both_sides(&self, cell: CellId) -> bool {
+        let around = self.delaunay.neighbours(cell).map(|other| inside(self.is_inside, other));
+        around.contains(&true) && around.contains(&false)
+    }
+
+    /// Whether moving a cell to the other side changes no homotopy type: the neighbours of each side are connected around it.
+    fn is_simple(&self, cell: CellId) -> bool {
+        if !self.has_both_sides(cell) || self.effect(cell) != 0 {
+            return false;
+        }
+        let Self { delaunay, is_inside, .. } = self;
+        let corners = delaunay.vertices(cell);
+        let around = delaunay.neighbours(cell);
+        [true, false].into_iter().all(|side| {
+            let is_of_side = |other: &CellId| {
+                *other != cell
+                    && inside(is_inside, *other) == side
+                    && delaunay.vertices(*other).iter().any(|v| corners.contains(v))
+            };
+            let mut waiting: Vec<CellId> = around.into_iter().filter(is_of_side).take(1).collect();
+            let mut seen: HashSet<CellId> = waiting.iter().copied().collect();
+            while let Some(next) = waiting.pop() {
+                for other in delaunay.neighbours(next).into_iter().filter(is_of_side) {
+                    if seen.insert(other) {
+                        waiting.push(other);
+                    }
+                }
+            }
+            around.iter().filter(|other| is_of_side(other)).all(|other| seen.contains(other))
+        })
+    }
+}
+
+fn inside(is_inside: &[bool], cell: CellId) -> bool {
+    is_inside.get(cell.index()).is_some_and(|&inside| inside)
+}
+
+/// Cells of one side that are connected through facets.
+fn regions(delaunay: &Delaunay, is_inside: &[bool]) -> DisjointSets {
+    let mut sets = DisjointSets::singletons(delaunay.cell_count());
+    for cell in delaunay.cells() {
+        for other in delaunay.neighbours(cell) {
+            if inside(is_inside, cell) == inside(is_inside, other) {
+                sets.join(cell.0, other.0);
+            }
+        }
+    }
+    sets
+}
+
+/// Numbers of regions inside and outside.
+fn numbers(delaunay: &Delaunay, is_inside: &[bool]) -> [usize; 2] {
+    let mut sets = regions(delaunay, is_inside);
+    let mut numbers = [0; 2];
+    for cell in delaunay.cells() {
+        if sets.find(cell.0) == cell.0 {
+            numbers[usize::from(!inside(is_inside, cell))] += 1;
+        }
+    }
+    numbers
+}
+
+/// The Euler characteristic of the dual complex of the cells inside.
+fn euler(delaunay: &Delaunay, is_inside: &[bool]) -> i64 {
+    let mut added = vec![false; is_inside.len()];
+    let mut sum = 0;
+    for cell in delaunay.finite_cells().filter(|cell| is_inside[cell.index()]) {
+        sum += effect(delaunay, &added, cell);
+        added[cell.index()] = true;
+    }
+    sum
+}
+
+/// The change of the Euler characteristic when a cell is added to those inside: its dual vertex, with the dual edge of each
+/// facet, the dual polygon of each edge, and the dual polyhedron of each vertex that are complete then.
+fn effect(delaunay: &Delaunay, is_inside: &[bool], cell: CellId) -> i64 {
+    let is_in = |other: &CellId| *other == cell || inside(is_inside, *other);
+    let facets = delaunay.neighbours(cell).iter().filter(|other| is_in(other)).count();
+    let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+    let edges =
+        pairs.iter().filter(|&&(i, j)| delaunay.edge_ring(cell, i, j).all(|c| is_in(&c))).count();
+    let vertices = delaunay.vertices(cell);
+    let vertices = vertices.iter().filter(|v| star(delaunay, v.0).iter().all(is_in)).count();
+    1 - facets as i64 + edges as i64 - vertices as i64
+}
+
+fn volume(delaunay: &Delaunay, cell: CellId) -> f64 {
+    if delaunay.is_infinite(cell) {
+        return f64::INFINITY;
+    }
+    let [a, b, c, d] = delaunay.vertices(cell).map(|v| delaunay.point(v));
+    (b - a).cross(c - a).dot(d - a).abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::prelude::*;
+    use rand_pcg::Pcg64;
+
+    use super::*;
+    use crate::Vec3;
+
+    #[test]
+    fn tunnels_are_closed() {
+        let mut mended = 0;
+        for seed in 0..40 {
+            let mut rng = Pcg64::seed_from_u64(seed);
+            let mut coordinate = || rng.random_range(-1.0..1.0);
+            let points: Vec<Vec3> =
+                (0..120).map(|_| Vec3::from_array([(); 3].map(|()| coordinate()))).collect();
+            let delaunay = Delaunay::new(&points).unwrap();
+            let centroid = |cell: CellId| {
+                let corners = delaunay.vertices(cell).map(|v| delaunay.point(v));
+                corners.into_iter().sum::<Vec3>() / 4.0
+            };
+            // All but a tunnel.
+            let is_far = |cell: &CellId, radius: f64| {
+                let at = centroid(*cell);
+                at.x.hypot(at.y) > radius
+            };
+            let mut is_inside: Vec<bool> =
+                delaunay.finite_cells().map(|cell| is_far(&cell, 0.25)).collect();
+            join(&delaunay, &mut is_inside, [1, 0, 0]);
+            if euler(&delaunay, &is_inside) == 1 {
+                continue;
+            }
+            let before = is_inside.clone();
+            let cells = delaunay.finite_cells().filter(|cell| !is_far(cell, 0.5)).collect();
+            let cells = by_volume(&delaunay, cells);
+            let excess = euler(&delaunay, &is_inside) - 1;
+            let mut mending = Mending {
+                delaunay: &delaunay,
+                is_inside: &mut is_inside,
+                numbers: [1, 1],
+                excess,
+                trials: TRIALS,
+            };
+            mending.mend_all(&cells);
+            assert_eq!(mending.excess, 0, "seed {seed}: {excess}");
+            assert_eq!((euler(&delaunay, &is_inside), numbers(&delaunay, &is_inside)), (1, [1, 1]));
+            let mut moved =
+                delaunay.finite_cells().filter(|c| is_inside[c.index()] != before[c.index()]);
+            assert!(moved.all(|cell| !is_far(&cell, 0.5)), "seed {seed}");
+            mended += 1;
+        }
+        assert!(mended >= 20, "{mended} of 40 have a loop");
+    }
+}
