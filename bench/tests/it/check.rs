@@ -1,4 +1,4 @@
-//! The conformance corpus: all methods of the project pass it, and broken methods fail.
+//! The verb `check`: all methods of the project pass the conformance corpus, and broken methods fail.
 
 use serde_json::Value;
 

@@ -1,4 +1,4 @@
-//! Part pruning: the sheets of a box, loops of solids with tunnels, real meshes.
+//! Part pruning of Tam and Heidrich: the sheets of a box, loops of solids with tunnels, real meshes.
 
 use std::collections::BTreeSet;
 

@@ -1,4 +1,4 @@
-//! Made-up records that look like real ones: errors fall with the number of spheres, methods
+//! Made-up records for the tests of this folder, which look like real ones: errors fall with the number of spheres, methods
 //! differ, some runs fail.
 
 use std::collections::BTreeMap;

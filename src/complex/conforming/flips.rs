@@ -1,4 +1,4 @@
-//! Flips of diagonals to edges of the triangulation.
+//! Flips of diagonals of the surface to edges of the Delaunay triangulation.
 
 use super::skin::{Skin, key, sides};
 use super::stars::Stars;

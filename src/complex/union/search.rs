@@ -1,4 +1,4 @@
-//! Searches among the primitives of a union.
+//! The primitives of a union in a tree, and the searches among them.
 
 use std::ops::Range;
 

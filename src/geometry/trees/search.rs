@@ -1,4 +1,4 @@
-//! Searching the tree: nearest box first, without the boxes beyond the limit.
+//! Searching a tree of boxes: nearest box first, without the boxes beyond the limit.
 
 use std::ops::{ControlFlow, Range};
 
