@@ -73,6 +73,10 @@ const SLACK: usize = 20_000;
 /// Limit of rounds against balls that reach far beyond the surface. Few shapes need ten.
 const APPROACHES: usize = 40;
 
+/// Points of all rounds of refinement against far balls, summed, after which no further one begins. Resolved solids with
+/// hairline gaps need more, most others less than a tenth.
+const WORK: usize = 12_000_000;
+
 /// How a surface is refined.
 #[derive(Clone, Copy, Debug)]
 struct Way {
@@ -285,8 +289,11 @@ impl Refinement {
     fn approach(&mut self, surface: &TriangleBvh, is_coarse: bool) {
         let closest = CLOSE * self.skin.diagonal;
         let mut closed: Vec<(Vec3, f64)> = Vec::new();
-        let mut distance = closest;
+        let (mut distance, mut work) = (closest, 0);
         for _ in 0..APPROACHES {
+            if work > WORK {
+                return;
+            }
             let give_ups = self.give_ups + 1;
             let way = Way { bends: false, give_ups, rounds: ROUNDS, ..self.way };
             let mut next = Self { way, ..self.clone() };
@@ -301,6 +308,7 @@ impl Refinement {
             let missing = std::mem::take(&mut next.missing);
             let conforms = next.insert(before, missing);
             let conforms = conforms.and_then(|missing| next.conform(missing, Some(surface)));
+            work += (next.rounds - self.rounds) * next.skin.points.len();
             if conforms.is_ok() && next.give_ups == self.give_ups {
                 *self = next;
                 distance = closest;
