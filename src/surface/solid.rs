@@ -41,6 +41,9 @@ const TOLERANCES: [f64; 4] = [0.0, 1e-9, 1e-7, 1e-6];
 /// Largest thickness of a wall between bodies, as a fraction of the diagonal.
 const WALL: f64 = 1e-6;
 
+/// Largest thickness of a cavity of an arrangement that is left out, as a fraction of the diagonal.
+const SLIT: f64 = 1e-5;
+
 /// Length below which edges of the result are contracted, as a fraction of the diagonal.
 const SHORT: f64 = 1e-5;
 
@@ -147,6 +150,7 @@ fn resolved(
         let is_alike =
             reaches(&simple, &whole) && (volume(&simple, unit) - all).abs() <= LOSS * all;
         for candidate in is_alike.then_some(simple).into_iter().chain([whole]) {
+            let (candidate, slits) = without_slits(candidate, unit);
             let Some(Closed { found, separated, contracted }) = closed(&candidate, unit, diagonal)
             else {
                 continue;
@@ -154,7 +158,8 @@ fn resolved(
             if is_solid(&found) {
                 let by = found.mesh.faces.len();
                 repairs.push(Repair::ResolvedFaces { faces: replaced, by });
-                repairs.extend(separations.into_iter().chain(separated).chain(contracted));
+                let others = separations.into_iter().chain(separated).chain(contracted);
+                repairs.extend(slits.into_iter().chain(others));
                 return Some(loaded(found, repairs));
             }
             // The next pass takes the arrangement itself where the check opened it: of two opposite faces it drops one.
@@ -175,6 +180,37 @@ struct Closed {
     found: Inspection,
     separated: Option<Repair>,
     contracted: Option<Repair>,
+}
+
+/// An arrangement without the cavities that bodies nearly in contact leave between them.
+fn without_slits(mut mesh: TriMesh, unit: Unit) -> (TriMesh, Option<Repair>) {
+    let scaled = TriMesh { vertices: unit.forward_all(&mesh.vertices), faces: mesh.faces.clone() };
+    let extent = scaled.bounding_box().map_or(0.0, |(low, high)| (high - low).length());
+    let Topology { component, first_face, .. } =
+        Topology::new(scaled.vertices.len(), &scaled.faces);
+    // Six times the volume, and twice the area.
+    let mut sizes = vec![(0.0, 0.0); first_face.len()];
+    for (face, &own) in component.iter().enumerate() {
+        let origin = scaled.triangle(first_face[own as usize] as usize)[0];
+        let [a, b, c] = scaled.triangle(face).map(|p| p - origin);
+        let (volume, area) = &mut sizes[own as usize];
+        *volume += a.dot(b.cross(c));
+        *area += (b - a).cross(c - a).length();
+    }
+    // Of a flat cavity, 2 volumes over the area are its thickness.
+    let is_slit =
+        |&(volume, area): &(f64, f64)| volume <= 0.0 && -2.0 / 3.0 * volume <= SLIT * extent * area;
+    let components = sizes.iter().filter(|sizes| is_slit(sizes)).count();
+    if components == 0 || components == sizes.len() {
+        return (mesh, None);
+    }
+    let before = mesh.faces.len();
+    let mut of_face = component.iter();
+    mesh.faces.retain(|_| of_face.next().is_some_and(|&c| !is_slit(&sizes[c as usize])));
+    let faces = before - mesh.faces.len();
+    let kept = compact(mesh.vertices.len(), &mut mesh.faces);
+    mesh.vertices = kept.into_iter().map(|v| mesh.vertices[v as usize]).collect();
+    (mesh, Some(Repair::DroppedComponents { components, faces }))
 }
 
 /// An arrangement whose parts are separated where they touch, with short edges contracted.

@@ -440,6 +440,19 @@ fn pins_in_holes_at_an_angle_are_joined() {
 }
 
 #[test]
+fn slits_between_joined_bodies_are_no_cavities() {
+    let turn = DMat3::from_rotation_x(0.7);
+    // 3e-6 and 3e-3 of the diagonal.
+    for (gap, cavities) in [(3e-5, 0), (3e-2, 1)] {
+        let floor = cuboid(Vec3::new(-3.0, -3.0, -1.0), Vec3::new(3.0, 3.0, 0.0));
+        let pin = prism(8, 1.0, [gap, 2.0], false);
+        let parts = [floor, prism(8, 1.0, [0.0, 1.0], true), pin];
+        let report = read(&moved(joined(&parts), |v| turn * v)).report;
+        assert_eq!(report.expected_betti, Some([1, 0, cavities]), "{gap}: {report:?}");
+    }
+}
+
+#[test]
 fn thin_and_distant_plates_are_kept() {
     let cube = cuboid(Vec3::splat(-0.5), Vec3::splat(0.5));
     for (thickness, shift) in [(1e-4, 0.0), (1e-6, 1e6), (1e-3, 1e10)] {
