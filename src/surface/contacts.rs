@@ -21,12 +21,16 @@ const ALIGNED: f64 = 0.9;
 /// Cosine of the angle between two faces above which they push a vertex as one.
 const ALIKE: f64 = 0.999;
 
-/// How far a body is pushed, in distances up to which bodies are in contact.
+/// How far the largest body is pushed, in distances up to which bodies are in contact. The smallest is pushed twice as far,
+/// and the others in between, so that no two end in one plane.
 const PUSH: f64 = 4.0;
 
-/// Share by which each further body is pushed more than the one before, so that no two end in one plane, and the number of
-/// bodies after which this begins again.
-const STEP: (f64, usize) = (0.1, 10);
+/// How far the largest body is drawn back where it looks the same way as another one. The smallest goes twice as far, less
+/// than anything is pushed.
+const BACK: f64 = 1.0;
+
+/// Limit of the way of a vertex, in pushes. A wedge would leave its groove to move both sides.
+const MOST: f64 = 2.0;
 
 /// Share of a push that a direction without a face is damped by.
 const DAMPING: f64 = 1e-6;
@@ -61,7 +65,9 @@ fn way(pushes: &Pushes) -> Vec3 {
     let sum = pushes
         .iter()
         .fold(DMat3::from_diagonal(Vec3::splat(DAMPING)), |sum, &(n, _)| sum + outer(n));
-    sum.inverse() * pushes.iter().map(|&(n, distance)| distance * n).sum::<Vec3>()
+    let way = sum.inverse() * pushes.iter().map(|&(n, distance)| distance * n).sum::<Vec3>();
+    let most = pushes.iter().fold(0.0, |most: f64, &(_, distance)| most.max(distance.abs()));
+    way.clamp_length_max(MOST * most)
 }
 
 /// The bodies of a surface.
@@ -122,8 +128,8 @@ impl<'m> Bodies<'m> {
         let _ = self.each_contact(|Contact { face, is_opposed, .. }| {
             let up = normal(self.mesh.triangle(face as usize)).normalize_or_zero();
             let rank = self.rank[self.body[face as usize] as usize].unwrap_or_default();
-            let push = PUSH * self.most * (1.0 + STEP.0 * (rank % STEP.1) as f64);
-            let push = if is_opposed { push } else { -push };
+            let farther = self.most * (1.0 + rank as f64 / self.rank.len() as f64);
+            let push = if is_opposed { PUSH * farther } else { -BACK * farther };
             for v in self.mesh.faces[face as usize] {
                 let pushes = found.entry(v).or_default();
                 match pushes.iter_mut().find(|(n, _)| n.dot(up) > ALIKE) {

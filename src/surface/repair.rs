@@ -25,7 +25,7 @@ use crate::geometry::predicates::{Point2, Sign, orient2d, project};
 
 /// A triangle mesh with the repairs made. Its faces have distinct corners, but may be defective
 /// otherwise.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Repaired {
     pub vertices: Vec<Vec3>,
     pub faces: Vec<[u32; 3]>,

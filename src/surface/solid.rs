@@ -81,19 +81,26 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
             return None;
         }
         tried.push(vertices);
-        resolved(built, weld, unit, checked)
+        let pushed = resolved(built.clone(), weld.clone(), unit, checked, true);
+        pushed.or_else(|| resolved(built, weld, unit, checked, false))
     })
 }
 
-/// The solid of welded triangles.
+/// The solid of welded triangles. Either bodies in contact are pushed into each other, if there are any, or walls between
+/// bodies are left out: what is left of walls would hide contacts.
 fn resolved(
     mut built: Repaired,
     weld: Option<Repair>,
     unit: Unit,
     checked: &Inspection,
+    is_pushed: bool,
 ) -> Option<Loaded> {
     let diagonal = checked.report.diagonal;
     let mut repairs = checked.report.repairs.clone();
+    let drop_walls = |vertices: &mut Vec<Vec3>, faces: &mut Vec<[u32; 3]>| match is_pushed {
+        true => None,
+        false => drop_walls(vertices, faces),
+    };
     let walls = drop_walls(&mut built.vertices, &mut built.faces);
     built.points = unit.forward_all(&built.vertices);
     let (mut mesh, turns) = oriented(built)?;
@@ -114,8 +121,9 @@ fn resolved(
     });
     repairs.extend(weld.into_iter().chain(walls).chain(turns));
     let replaced = mesh.faces.len();
-    if let Some((found, push)) = pushed_together(&mesh, unit) {
-        mesh = found;
+    if is_pushed {
+        let push;
+        (mesh, push) = pushed_together(&mesh, unit)?;
         repairs.push(push);
     }
     // A weld may have been all that was missing.

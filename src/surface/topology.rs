@@ -15,7 +15,7 @@ use crate::geometry::DisjointSets;
 use crate::sum::Sum;
 
 /// Adjacency, defects and components of a triangle mesh, with any defects.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Topology {
     /// The half-edge across each half-edge, or [`NONE`] where there is none or more than one.
     across: Vec<u32>,
