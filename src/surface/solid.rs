@@ -126,6 +126,9 @@ fn resolved(
         (mesh, push) = pushed_together(&mesh, unit)?;
         repairs.push(push);
     }
+    let slits;
+    (mesh, slits) = without_slits(mesh, unit);
+    repairs.extend(slits);
     // A weld may have been all that was missing.
     let found = examined(&mesh)?;
     if is_solid(&found) {
@@ -194,8 +197,12 @@ struct Closed {
 fn without_slits(mut mesh: TriMesh, unit: Unit) -> (TriMesh, Option<Repair>) {
     let scaled = TriMesh { vertices: unit.forward_all(&mesh.vertices), faces: mesh.faces.clone() };
     let extent = scaled.bounding_box().map_or(0.0, |(low, high)| (high - low).length());
-    let Topology { component, first_face, .. } =
-        Topology::new(scaled.vertices.len(), &scaled.faces);
+    // Where rounding turned two faces around each other at an edge, they are a part of their own.
+    let Some(Parted { faces: apart, vertices, .. }) = parted(&scaled.vertices, &scaled.faces)
+    else {
+        return (mesh, None);
+    };
+    let Topology { component, first_face, .. } = Topology::new(vertices.len(), &apart);
     // Six times the volume, and twice the area.
     let mut sizes = vec![(0.0, 0.0); first_face.len()];
     for (face, &own) in component.iter().enumerate() {

@@ -440,6 +440,55 @@ fn pins_in_holes_at_an_angle_are_joined() {
 }
 
 #[test]
+fn cubes_cut_in_single_precision_are_one_body() {
+    // A cube in four pieces, whose cut faces rounding has moved.
+    let corner = |x: f64, y: f64, z: f64| Vec3::new(x, y, z);
+    let mut random = Pcg64::seed_from_u64(31);
+    for case in 0..60 {
+        let cut = random.random_range(0.3..0.7);
+        let other = random.random_range(0.2..0.8);
+        let pieces = [
+            cuboid(corner(0.0, 0.0, 0.0), corner(cut, other, 1.0)),
+            cuboid(corner(0.0, other, 0.0), corner(cut, 1.0, 1.0)),
+            cuboid(corner(cut, 0.0, 0.0), corner(1.0, 1.0, 0.5)),
+            cuboid(corner(cut, 0.0, 0.5), corner(1.0, 1.0, 1.0)),
+        ];
+        let axis = Vec3::from([(); 3].map(|()| random.random_range(-1.0..1.0))).normalize();
+        let turn = DMat3::from_axis_angle(axis, random.random_range(0.0..TAU));
+        let single = |v: Vec3| Vec3::from((turn * v).to_array().map(|x| f64::from(x as f32)));
+        let report = read(&moved(joined(&pieces), single)).report;
+        assert_eq!(report.expected_betti, Some([1, 0, 0]), "{case}: {report:?}");
+        let found = report.volume.expect("closed");
+        assert!((found - 1.0).abs() < 1e-4, "{case}: {found}");
+    }
+}
+
+#[test]
+fn a_wedge_in_its_groove_reaches_no_other_body() {
+    let turn = DMat3::from_rotation_y(0.4) * DMat3::from_rotation_x(0.7);
+    let prism = |profile: &[[f64; 2]], faces: &[[u32; 3]]| {
+        let count = profile.len() as u32;
+        let at = |y: f64| profile.iter().map(move |&[x, z]| Vec3::new(x, y, z));
+        let vertices = at(0.0).chain(at(2.0)).collect();
+        let caps = faces.iter().flat_map(|&[a, b, c]| [[a, b, c], [a, c, b].map(|v| v + count)]);
+        let sides = (0..count).flat_map(|a| {
+            let b = (a + 1) % count;
+            [[b, a, a + count], [b, a + count, b + count]]
+        });
+        TriMesh { vertices, faces: caps.chain(sides).collect() }
+    };
+    // A groove of 0.01 by 1, the wedge that fills it, and a plate below.
+    let block =
+        [[-2.0, 0.0], [2.0, 0.0], [2.0, 1.2], [0.01, 1.2], [0.0, 0.2], [-0.01, 1.2], [-2.0, 1.2]];
+    let caps = [[0, 1, 4], [1, 2, 3], [1, 3, 4], [0, 4, 5], [0, 5, 6]];
+    let wedge = prism(&[[0.0, 0.2], [0.01, 1.2], [-0.01, 1.2]], &[[0, 1, 2]]);
+    let plate = cuboid(Vec3::new(-2.0, 0.0, -0.5), Vec3::new(2.0, 2.0, -0.001));
+    let parts = [prism(&block, &caps), wedge, plate];
+    let report = read(&moved(joined(&parts), |v| turn * v)).report;
+    assert_eq!(report.expected_betti, Some([2, 0, 0]), "{report:?}");
+}
+
+#[test]
 fn slits_between_joined_bodies_are_no_cavities() {
     let turn = DMat3::from_rotation_x(0.7);
     // 3e-6 and 3e-3 of the diagonal.
