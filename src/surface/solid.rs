@@ -81,25 +81,35 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
             return None;
         }
         tried.push(vertices);
-        let pushed = resolved(built.clone(), weld.clone(), unit, checked, true);
-        pushed.or_else(|| resolved(built, weld, unit, checked, false))
+        let mut ways = [Way::WallsAlone, Way::Pushed, Way::Walls].into_iter();
+        ways.find_map(|way| resolved(built.clone(), weld.clone(), unit, checked, way))
     })
 }
 
-/// The solid of welded triangles. Either bodies in contact are pushed into each other, if there are any, or walls between
-/// bodies are left out: what is left of walls would hide contacts.
+/// How touching bodies are joined.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Way {
+    /// Walls between them are left out, which gives the solid.
+    WallsAlone,
+    /// They are pushed into each other, with their walls: what is left of walls would hide contacts.
+    Pushed,
+    /// Walls are left out.
+    Walls,
+}
+
+/// The solid of welded triangles.
 fn resolved(
     mut built: Repaired,
     weld: Option<Repair>,
     unit: Unit,
     checked: &Inspection,
-    is_pushed: bool,
+    way: Way,
 ) -> Option<Loaded> {
     let diagonal = checked.report.diagonal;
     let mut repairs = checked.report.repairs.clone();
-    let drop_walls = |vertices: &mut Vec<Vec3>, faces: &mut Vec<[u32; 3]>| match is_pushed {
-        true => None,
-        false => drop_walls(vertices, faces),
+    let drop_walls = |vertices: &mut Vec<Vec3>, faces: &mut Vec<[u32; 3]>| match way {
+        Way::Pushed => None,
+        Way::WallsAlone | Way::Walls => drop_walls(vertices, faces),
     };
     let walls = drop_walls(&mut built.vertices, &mut built.faces);
     built.points = unit.forward_all(&built.vertices);
@@ -121,18 +131,33 @@ fn resolved(
     });
     repairs.extend(weld.into_iter().chain(walls).chain(turns));
     let replaced = mesh.faces.len();
-    if is_pushed {
-        let push;
-        (mesh, push) = pushed_together(&mesh, unit)?;
-        repairs.push(push);
+    match way {
+        Way::WallsAlone => {
+            let (apart, most) = apart(&mesh, unit);
+            if contacts::has_contacts(&apart, most) {
+                return None;
+            }
+        }
+        Way::Pushed => {
+            let push;
+            (mesh, push) = pushed_together(&mesh, unit)?;
+            repairs.push(push);
+        }
+        Way::Walls => {}
     }
     let slits;
     (mesh, slits) = without_slits(mesh, unit);
+    if way == Way::WallsAlone && slits.is_some() {
+        return None;
+    }
     repairs.extend(slits);
     // A weld may have been all that was missing.
     let found = examined(&mesh)?;
     if is_solid(&found) {
         return Some(loaded(found, repairs));
+    }
+    if way == Way::WallsAlone {
+        return None;
     }
     let is_wall = |repair: &Repair| matches!(repair, Repair::DroppedDuplicateFaces { .. });
     if !found.report.self_intersecting && !found.report.repairs.iter().any(is_wall) {
@@ -267,14 +292,10 @@ pub(super) fn has_contacts(mesh: &TriMesh, unit: Unit) -> bool {
     contacts::has_contacts(&scaled, most)
 }
 
-/// The surface with such bodies pushed into each other, also those with common vertices.
+/// The surface with such bodies pushed into each other.
 fn pushed_together(mesh: &TriMesh, unit: Unit) -> Option<(TriMesh, Repair)> {
-    let (mut scaled, most) = scaled(mesh, unit);
-    if let Some(Parted { faces, vertices, .. }) = parted(&scaled.vertices, &scaled.faces) {
-        let vertices = vertices.into_iter().map(|v| scaled.vertices[v as usize]).collect();
-        scaled = TriMesh { vertices, faces };
-    }
-    let (mut mesh, vertices, distance) = contacts::pushed(&scaled, most)?;
+    let (apart, most) = apart(mesh, unit);
+    let (mut mesh, vertices, distance) = contacts::pushed(&apart, most)?;
     mesh.vertices.iter_mut().for_each(|v| *v = unit.restore(*v));
     let distance = unit.backward(distance, 1).unwrap_or_default();
     Some((mesh, Repair::PushedVertices { vertices, distance }))
@@ -285,6 +306,19 @@ fn scaled(mesh: &TriMesh, unit: Unit) -> (TriMesh, f64) {
     let scaled = TriMesh { vertices: unit.forward_all(&mesh.vertices), faces: mesh.faces.clone() };
     let extent = scaled.bounding_box().map_or(0.0, |(low, high)| (high - low).length());
     (scaled, WALL * extent)
+}
+
+/// The same with vertices for each body.
+fn apart(mesh: &TriMesh, unit: Unit) -> (TriMesh, f64) {
+    let (scaled, most) = scaled(mesh, unit);
+    let apart = match parted(&scaled.vertices, &scaled.faces) {
+        Some(Parted { faces, vertices, .. }) => {
+            let vertices = vertices.into_iter().map(|v| scaled.vertices[v as usize]).collect();
+            TriMesh { vertices, faces }
+        }
+        None => scaled,
+    };
+    (apart, most)
 }
 
 /// Whether `found` bounds the region where the winding number of `surface` is at least 1, by points beside the faces of
