@@ -2,7 +2,10 @@
 //!
 //! At a general angle the plane between two bodies has no exact corners in floating-point numbers: a gap of a rounding
 //! stays between them, or they cross in a part of it, and no arrangement of such faces is of use. So the smaller body is
-//! pushed into the larger one, by far more than rounding and far less than anyone sees.
+//! pushed into the larger one, by 4e-6 to 8e-6 of the diagonal. Where faces of both look the same way in one plane, the
+//! smaller body is drawn back by a quarter of that, or they would cross there.
+//!
+//! Plates of a few times that thickness become thinner, and bodies that touch themselves are not found.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;

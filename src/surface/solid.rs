@@ -9,7 +9,8 @@
 //! 1. *Weld*: vertices within the first of [`TOLERANCES`] that closes the surface, or the next one where 2 to 4 fail.
 //! 2. *Orient*: plane walls between bodies are left out, and bodies that touch taken apart (`parts.rs`). Then they are turned
 //!    outward, or inward where they are cavities.
-//! 3. *Push*: of bodies that stand on each other to within rounding, the smaller one into the larger (`contacts.rs`).
+//! 3. *Push*: where leaving out walls does not give a solid, of bodies that stand on each other to within rounding the
+//!    smaller one goes into the larger (`contacts.rs`), with the walls. Cavities as thin as rounding makes them are left out.
 //! 4. *Resolve*: the winding number, compared with that of the input at points. Repeated while rounding makes faces cross.
 //! 5. *Separate*: parts that touch in a vertex or along an edge.
 
@@ -41,7 +42,7 @@ const TOLERANCES: [f64; 4] = [0.0, 1e-9, 1e-7, 1e-6];
 /// Largest thickness of a wall between bodies, as a fraction of the diagonal.
 const WALL: f64 = 1e-6;
 
-/// Largest thickness of a cavity of an arrangement that is left out, as a fraction of the diagonal.
+/// Largest thickness of a cavity that is left out while a solid is resolved, as a fraction of the diagonal.
 const SLIT: f64 = 1e-5;
 
 /// Length below which edges of the result are contracted, as a fraction of the diagonal.
@@ -91,7 +92,7 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
 enum Way {
     /// Walls between them are left out, which gives the solid.
     WallsAlone,
-    /// They are pushed into each other, with their walls: what is left of walls would hide contacts.
+    /// The smaller body is pushed into the larger one. No wall is left out before, as the rest of it would join both bodies.
     Pushed,
     /// Walls are left out.
     Walls,
@@ -200,13 +201,13 @@ fn resolved(
             }
             // The next pass takes the arrangement itself where the check opened it: of two opposite faces it drops one.
             next.get_or_insert(match found.refused {
-                None => (found.mesh, separated),
-                Some(_) => (candidate, None),
+                None => (found.mesh, slits, separated),
+                Some(_) => (candidate, slits, None),
             });
         }
-        let separated;
-        (mesh, separated) = next?;
-        separations.extend(separated);
+        let (slits, separated);
+        (mesh, slits, separated) = next?;
+        separations.extend(slits.into_iter().chain(separated));
     }
     None
 }
@@ -218,7 +219,7 @@ struct Closed {
     contracted: Option<Repair>,
 }
 
-/// An arrangement without the cavities that bodies nearly in contact leave between them.
+/// A surface without the cavities that bodies nearly in contact leave between them.
 fn without_slits(mut mesh: TriMesh, unit: Unit) -> (TriMesh, Option<Repair>) {
     let scaled = TriMesh { vertices: unit.forward_all(&mesh.vertices), faces: mesh.faces.clone() };
     let extent = scaled.bounding_box().map_or(0.0, |(low, high)| (high - low).length());

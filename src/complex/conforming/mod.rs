@@ -73,8 +73,8 @@ const SLACK: usize = 20_000;
 /// Limit of rounds against balls that reach far beyond the surface. Few shapes need ten.
 const APPROACHES: usize = 40;
 
-/// Points of all rounds of refinement against far balls, summed, after which no further one begins. Resolved solids with
-/// hairline gaps need more, most others less than a tenth.
+/// Number of points, summed over all rounds of refinement, after which no further round against far balls begins. Solids with
+/// hairline gaps reach it.
 const WORK: usize = 12_000_000;
 
 /// How a surface is refined.
@@ -146,8 +146,8 @@ pub enum ConformingError {
 impl Conforming {
     /// Halves the longest edges of a closed, oriented surface until it has `least` points. Then refines it until the
     /// Delaunay triangulation contains it, and until the balls of its cells end near the surface; no round of that
-    /// begins after `most` points were added. `betti` are the solid's Betti numbers, where they are known. The same result for any number of threads. Cost: `O(n log n)` expected,
-    /// and `O(n)` for each round.
+    /// begins after `most` points were added. `betti` are the solid's Betti numbers, where they are known. The
+    /// same result for any number of threads. Cost: `O(n log n)` expected, and `O(n)` for each round.
     ///
     /// # Errors
     /// When the vertices do not span space, the surface touches or crosses itself, or the points do not
@@ -284,8 +284,9 @@ impl Refinement {
     }
 
     /// Step 6: adds points until all balls end near the surface or the limit is reached; on coarse surfaces also until they
-    /// close no gap, and none of its vertices is far from them. A round that gives up patches is undone, and no point is added again near those of its points that are next to a triangle that stayed missing: at
-    /// twice the distance each time.
+    /// close no gap, and none of its vertices is far from them. A round that gives up patches is undone, and no point is
+    /// added again near those of its points that are next to a triangle that stayed missing: at twice the distance each
+    /// time.
     fn approach(&mut self, surface: &TriangleBvh, is_coarse: bool) {
         let closest = CLOSE * self.skin.diagonal;
         let mut closed: Vec<(Vec3, f64)> = Vec::new();
