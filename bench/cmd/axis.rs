@@ -35,7 +35,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let (input, shape) =
         stages.timed("read", || shape_of(&arguments.mesh, options, arguments.substrate.as_is))?;
     line.at("computing the medial mesh");
-    let mesh = shape.voronoi().map_err(|error| Failure::at(&arguments.mesh, error))?;
+    let mesh = shape.initial().map_err(|error| Failure::at(&arguments.mesh, error))?;
     line.at("counting components, loops and voids");
     let betti = complex::betti(&mesh);
     let mut lost = None;

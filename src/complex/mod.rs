@@ -1,5 +1,6 @@
 //! The medial mesh: a simplicial complex of dimension at most two on medial spheres.
 
+mod bulges;
 pub mod collapse;
 mod conforming;
 mod contour;
@@ -11,6 +12,7 @@ mod union;
 pub mod union_axis;
 mod voronoi;
 
+pub use bulges::without_bulges;
 pub use conforming::{Conforming, ConformingError};
 pub use contour::{ContourError, UnionSurface, union_surface, union_surface_within};
 pub use formats::{

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use crate::Vec3;
 use crate::complex::{
     CellSpheres, ComplexError, Conforming, ConformingError, DualTriangulation, MedialMesh,
-    MedialUnion, Sphere, VoronoiFacets, voronoi_medial_mesh,
+    MedialUnion, Sphere, VoronoiFacets, voronoi_medial_mesh, without_bulges,
 };
 use crate::diagnostics::Diagnostics;
 use crate::geometry::{Delaunay, TriangulationError, VertexId};
@@ -92,6 +92,7 @@ struct OfSamples {
     centred: Slot<Arc<CellSpheres>>,
     facets: Slot<Arc<VoronoiFacets>>,
     medial: Slot<Arc<MedialMesh>>,
+    initial: Slot<Arc<MedialMesh>>,
     balls: Slot<Arc<InnerBalls>>,
 }
 
@@ -664,14 +665,19 @@ impl Shape {
     }
 
     /// The medial mesh that every simplifier of this shape starts from, in normalised units: the
-    /// given one, or the Voronoi medial mesh.
+    /// given one, or the Voronoi medial mesh, with spheres on the edges that reach far beyond the surface.
     ///
     /// # Errors
     /// As [`Shape::voronoi`]; when the given mesh has no sphere or is not valid.
     pub fn initial(&self) -> Result<Arc<MedialMesh>, ShapeError> {
         match &self.given {
             Some(given) => given.clone(),
-            None => self.voronoi(),
+            None => {
+                let (voronoi, inside) = (self.voronoi()?, self.inside_test());
+                self.built(Substrate::MedialMesh, &self.store.of_samples.initial, || {
+                    Ok(without_bulges(&voronoi, &inside).map_or(voronoi, Arc::new))
+                })
+            }
         }
     }
 

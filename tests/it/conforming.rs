@@ -2,7 +2,7 @@
 
 use medial::Vec3;
 use medial::complex::{MedialMesh, betti};
-use medial::metrics::{Judge, JudgeOptions, Truth};
+use medial::metrics::{Distances, Judge, JudgeOptions, Truth};
 use medial::shape::{Shape, ShapeOptions};
 use medial::surface::{Format, Sampling, Side, TriMesh, read, read_bytes, validate};
 use medial_test_support::surfaces;
@@ -206,6 +206,25 @@ fn starts_of_blades_and_needles_reach_their_tips() {
 }
 
 #[test]
+fn starts_around_concave_edges_at_any_angle_end_near_them() {
+    let mut random = Pcg64::seed_from_u64(17);
+    for k in 0..12 {
+        let mut bar = || {
+            let half = Vec3::from([0.1, 0.2, 0.4].map(|most| random.random_range(0.1..2.0 * most)));
+            let axis = Vec3::from([0.0; 3].map(|_: f64| random.random_range(-1.0..1.0)));
+            let by = Vec3::from([0.0; 3].map(|_: f64| random.random_range(-0.3..0.3)));
+            shapes::moved(turned(shapes::cuboid(-half, half), axis), |p| p + by)
+        };
+        let bars = shapes::to_off(&shapes::joined(&[bar(), bar(), bar()]));
+        let solid = read_bytes(bars.as_bytes(), Format::Off).unwrap().mesh;
+        let (_, start) = right_start("bars", &solid);
+        let found = distances(&shape_of(&solid, Sampling::default()), &start);
+        // Balls may fill the bottom of a groove.
+        assert!(found.reverse < 0.02 && found.hausdorff < 0.03, "solid {k}: {found:?}");
+    }
+}
+
+#[test]
 fn a_start_that_leaves_parts_bare_is_named() {
     // A needle in pieces that are too short for a coarse surface.
     let rings: Vec<Vec3> = (0..15)
@@ -235,10 +254,14 @@ fn a_start_that_leaves_parts_bare_is_named() {
 
 /// The two-sided Hausdorff error of a start.
 fn error_of(shape: &Shape, start: &MedialMesh) -> f64 {
+    distances(shape, start).hausdorff
+}
+
+fn distances(shape: &Shape, start: &MedialMesh) -> Distances {
     let (tree, inside) = (shape.surface_tree().unwrap(), shape.inside_test());
     let options = JudgeOptions { samples: 4_000, volume_depth: 0, seed: 1 };
     let judge = Judge::new(shape.mesh().clone(), tree, inside, Truth::default(), options);
-    judge.distances(start).unwrap().hausdorff
+    judge.distances(start).unwrap()
 }
 
 /// Unions of random cells of a grid of random planes, without edges and vertices where they only touch.
