@@ -324,7 +324,7 @@ impl Found {
         });
         format!(
             "none of {} levels that were tried has a Hausdorff error of at most {} of the diagonal{best}; \
-             allow more, sample more densely (`--sampling blue:N`), or try another method, such as `tight`",
+             allow more, or sample more densely (`--sampling blue:N`)",
             self.tried,
             percent(bound)
         )

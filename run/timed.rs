@@ -322,9 +322,16 @@ pub(crate) fn failed(bound: f64, fault: Fault) -> LevelRun {
     LevelRun { level: Target::MaxError(bound), outcome: Err(fault), times: Times::default() }
 }
 
-fn missed(bound: f64, found: &Found) -> LevelRun {
-    failed(bound, Fault { status: Status::BoundMissed, reason: found.refusal(bound) })
+fn missed(bound: f64, found: &Found, advice: &str) -> LevelRun {
+    let reason = format!("{}{advice}", found.refusal(bound));
+    failed(bound, Fault { status: Status::BoundMissed, reason })
 }
+
+/// Runs of a method that holds bounds by itself, until its result is within the bound by the measure of the search.
+const DIRECT_RUNS: usize = 4;
+
+/// The largest ratio of the native levels of two such runs.
+const DIRECT_STEP: f64 = 0.97;
 
 /// A search for levels within error bounds.
 pub struct Bounds<'a> {
@@ -400,17 +407,28 @@ impl Bounds<'_> {
         Ok(())
     }
 
-    /// The run of a method that holds bounds by itself.
+    /// The run of a method that holds bounds by itself: its native level is the bound, and lower where its own
+    /// measure of the error is below that of the result.
     fn direct(&self, bound: f64) -> Result<(LevelRun, Option<Found>), Fault> {
-        let level = Level::Native(bound);
-        (self.trying)(level)?;
-        let run = self.timed(level, bound);
-        let Ok(Simplified { mesh, .. }) = &run.outcome else { return Ok((run, None)) };
-        let error = (self.measure)(mesh).map_err(SimplifyError::Level)?;
-        let probe = Probe { level, spheres: mesh.spheres.len(), error };
-        let within = (error <= bound).then_some(probe);
-        let found = Found { within, best: Some(probe), tried: 1 };
-        Ok((if within.is_some() { run } else { missed(bound, &found) }, Some(found)))
+        let mut level = bound;
+        let mut best: Option<Probe> = None;
+        for tried in 1..=DIRECT_RUNS {
+            (self.trying)(Level::Native(level))?;
+            let run = self.timed(Level::Native(level), bound);
+            let Ok(Simplified { mesh, .. }) = &run.outcome else { return Ok((run, None)) };
+            let error = (self.measure)(mesh).map_err(SimplifyError::Level)?;
+            let probe = Probe { level: Level::Native(level), spheres: mesh.spheres.len(), error };
+            if error <= bound {
+                return Ok((run, Some(Found { within: Some(probe), best: Some(probe), tried })));
+            }
+            best = [best, Some(probe)]
+                .into_iter()
+                .flatten()
+                .min_by(|a, b| a.error.total_cmp(&b.error));
+            level *= (bound / error).min(DIRECT_STEP);
+        }
+        let found = Found { within: None, best, tried: DIRECT_RUNS };
+        Ok((missed(bound, &found, ""), Some(found)))
     }
 
     /// The run of the fewest spheres within a bound. Each level found runs alone, and another is searched if its
@@ -422,7 +440,10 @@ impl Bounds<'_> {
     ) -> Result<(LevelRun, Option<Found>), Fault> {
         loop {
             let mut found = guarded(|| search.within(bound))?;
-            let Some(probe) = found.within else { return Ok((missed(bound, &found), Some(found))) };
+            let Some(probe) = found.within else {
+                let advice = "; `tight` reaches lower errors";
+                return Ok((missed(bound, &found, advice), Some(found)));
+            };
             let run = self.timed(probe.level, bound);
             let Ok(Simplified { mesh, .. }) = &run.outcome else { return Ok((run, Some(found))) };
             let alone = search.recheck(probe.level, mesh)?;
@@ -441,5 +462,63 @@ impl Bounds<'_> {
         let runs = answer(&view, self.info, || (self.prepare)(&view), &[level], &budget, |_| {});
         let run = runs.into_iter().next().expect("one level, one run");
         LevelRun { level: Target::MaxError(bound), ..run }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+
+    use medial::Vec3;
+    use medial::complex::{MedialMesh, Sphere};
+    use medial::shape::ShapeOptions;
+    use medial::simplifier::NativeLevel;
+    use medial::surface::{Format, read_bytes};
+
+    use super::*;
+
+    /// A method that holds bounds by itself, but measures less than the search.
+    #[test]
+    fn a_bound_that_a_method_misses_by_a_little_is_tried_again_below() {
+        let tetrahedron =
+            b"OFF 4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+        let loaded = read_bytes(tetrahedron, Format::Off).unwrap();
+        let shape = Shape::new("tetrahedron", &loaded.mesh, loaded.report, ShapeOptions::default())
+            .unwrap();
+        let native =
+            NativeLevel { is_error_bound: true, ..NativeLevel::larger_is_coarser("bound", "") };
+        let info = MethodInfo { native: Some(native), ..MethodInfo::new("own", "Own bounds") };
+        let prepare = preparing(|_| {
+            let at = |level: Level| {
+                let Level::Native(bound) = level else {
+                    return Err(SimplifyError::unsupported("no"));
+                };
+                let sphere = Sphere { centre: Vec3::ZERO, radius: bound };
+                let mesh = MedialMesh { spheres: vec![sphere], ..MedialMesh::default() };
+                Ok(Simplified::new(mesh, level))
+            };
+            Ok(Box::new(at) as Box<dyn Simplification>)
+        });
+        for (ratio, tried) in [(1.0, 1), (1.01, 2), (1.3, 2)] {
+            let found = Cell::new(None);
+            let Ok(()) = Bounds {
+                shape: &shape,
+                info: &info,
+                sweep: &[],
+                prepare: &prepare,
+                measure: &|mesh: &MedialMesh| Ok(ratio * mesh.spheres[0].radius),
+                budget: &Budget::from_now(None),
+                searching: &|_| {},
+                trying: &|_| Ok(()),
+            }
+            .answer(&[0.1], &mut |run, result| {
+                run.outcome.expect("a result");
+                found.set(result);
+                Ok::<_, Infallible>(())
+            });
+            let found = found.take().expect("searched");
+            assert!(found.within.expect("met").error <= 0.1, "{ratio}");
+            assert_eq!(found.tried, tried, "{ratio}");
+        }
     }
 }

@@ -129,8 +129,8 @@ pub struct NativeLevel {
     pub unit: Text,
     /// Whether a larger value leaves fewer spheres.
     pub larger_is_coarser: bool,
-    /// Whether its value is a bound of the two-sided error, which the method holds: a search for an error bound is
-    /// one run.
+    /// Whether its value is a bound of the two-sided error, which the method holds: a search for an error bound begins
+    /// there.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_error_bound: bool,
 }
