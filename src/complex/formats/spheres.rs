@@ -514,12 +514,20 @@ pub(super) fn parse_yaml(bytes: &[u8], name: &str, options: ReadOptions) -> Load
 
 fn from_document(document: &Value, name: &str, options: ReadOptions) -> Loaded {
     let mut links = Vec::new();
-    collect(document, "", &mut links).map_err(|why| malformed(name, None, why))?;
+    let spheres = for_collisions(document).map_err(|why| malformed(name, None, why))?;
+    collect(spheres, "", &mut links).map_err(|why| malformed(name, None, why))?;
     let mut loaded = chosen(links, name, options)?;
     for buffer in BUFFERS.into_iter().filter(|buffer| has_key(document, buffer)) {
         loaded.notes.push(format!("{buffer} was not added to the radii"));
     }
     Ok(loaded)
+}
+
+/// The geometry that the section `collision` of an XRDF document names, or the whole document.
+fn for_collisions(document: &Value) -> Result<&Value, String> {
+    let named = document.pointer("/collision/geometry").and_then(Value::as_str);
+    let Some((named, geometry)) = named.zip(document.get("geometry")) else { return Ok(document) };
+    geometry.get(named).ok_or_else(|| format!("collision: no geometry {}", quoted(named)))
 }
 
 /// Lengths that cuRobo and Isaac add to all radii, or to those of a link, when they use a file.
@@ -822,10 +830,10 @@ fn of_collision<'a>(element: Node<'a, '_>) -> Attributes<'a> {
 }
 
 /// Attributes of a `geom`, its own or of its default class.
-const GEOM: [&str; 5] = ["type", "mesh", "fromto", "pos", "size"];
+const GEOM: [&str; 7] = ["type", "mesh", "fromto", "pos", "size", "contype", "conaffinity"];
 
 /// Values of [`GEOM`].
-type Geom<'a> = [Option<&'a str>; 5];
+type Geom<'a> = [Option<&'a str>; 7];
 
 /// Key of the outermost default class, which may have any name.
 const MAIN: &str = "";
@@ -863,9 +871,13 @@ fn of_geom<'a>(
         None if [MAIN, "main"].contains(&class) => classes.get(MAIN).copied().unwrap_or_default(),
         None => return Err(format!("unknown class {}", quoted(class))),
     };
-    let [kind, mesh, ends, centre, radius] = with_defaults(element, defaults);
+    let [kind, mesh, ends, centre, radius, of_own, of_others] = with_defaults(element, defaults);
+    // One that nothing collides with is for the eye.
+    let collides =
+        [of_own, of_others].iter().any(|mask| mask.is_none_or(|mask| mask.trim() != "0"));
     // MuJoCo fits a sphere to the mesh, which this reader does not have. Ends belong to capsules and boxes.
-    let is_sphere = kind.unwrap_or("sphere") == "sphere" && mesh.is_none() && ends.is_none();
+    let is_sphere =
+        kind.unwrap_or("sphere") == "sphere" && mesh.is_none() && ends.is_none() && collides;
     Ok(is_sphere.then(|| [centre.unwrap_or("0 0 0"), radius.unwrap_or_default()]))
 }
 
@@ -959,9 +971,16 @@ mod tests {
         let childclass = "<mujoco><default><default class='c'><geom type='box' size='5'/></default></default>\
                           <worldbody><body childclass='c'><geom/><body><geom/><geom type='sphere'/></body></body>\
                           </worldbody></mujoco>";
+        let visual = "<mujoco><default><default class='visual'><geom contype='0' conaffinity='0'/></default></default>\
+                      <worldbody><geom class='visual' size='4'/><geom class='visual' contype='1' size='5'/>\
+                      <geom contype='0' size='6'/></worldbody></mujoco>";
+        let two = "collision: {geometry: b}\ngeometry:\n  a: {spheres: {l: [{center: [0, 0, 0], radius: 1}]}}\n  \
+                   b: {spheres: {l: [{center: [0, 0, 0], radius: 2}]}}\n";
         for (name, text, expected) in [
             ("x.xml", classes, &[2.0, 2.0, 3.0][..]),
             ("x.xml", childclass, &[5.0]),
+            ("x.xml", visual, &[5.0, 6.0]),
+            ("x.xrdf", two, &[2.0]),
             ("x.json", "\u{feff}[{\"center\": [0, 0, 0], \"radius\": 1}]", &[1.0]),
             ("x.yaml", "\u{feff}a: [{center: [0, 0, 0], radius: 1}]", &[1.0]),
             ("x.urdf", &format!("\u{feff}{urdf}"), &[2.0]),
@@ -1185,6 +1204,7 @@ x.yaml => a: 1\na: 2\n => , line 2: duplicate mapping key `a` is not allowed her
 x.yaml => a: 1\n---\nb: 2\n => , line 3: only single YAML document expected
 x.yaml => ~: 1\n => , line 1: null is not allowed here
 x.yaml => collision_spheres: spheres/franka.yml\n => : no spheres
+x.xrdf => {collision: {geometry: a}, geometry: {b: {}}} => : collision: no geometry "a"
 x.yaml => a:\n  - {center: [0, 0, 0], radius: -1}\n => : no spheres (found 1 with a negative radius)
 x.urdf => <robot>\n<link>\n</robot> => , line 3:
 x.urdf => <robot><link><collision><geometry><sphere radius='1'/><sphere radius='2'/></geometry></collision></link></robot> => , line 1: several shapes
