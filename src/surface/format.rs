@@ -51,13 +51,19 @@ impl fmt::Display for Format {
     }
 }
 
+/// Refuses text in UTF-16, whose line ends and digits hold a zero byte each.
+pub(crate) fn check_encoding(bytes: &[u8]) -> Result<(), &'static str> {
+    match bytes {
+        [0xff, 0xfe, _, 0, ..] | [0xfe, 0xff, 0, ..] => {
+            Err("text in UTF-16 is not read; write the file in UTF-8 or ASCII")
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Parses the content of a file that may have no face.
 pub(super) fn parse_points(bytes: &[u8], format: Format) -> Result<PolygonSoup, Fault> {
-    // Line ends and digits of UTF-16 hold a zero byte each.
-    if let [0xff, 0xfe, _, 0, ..] | [0xfe, 0xff, 0, ..] = bytes {
-        let why = "text in UTF-16 is not read; write the file in UTF-8 or ASCII";
-        return Err(Fault::Unsupported(why.into()));
-    }
+    check_encoding(bytes).map_err(|why| Fault::Unsupported(why.into()))?;
     match format {
         Format::Off => off::parse(bytes),
         Format::Obj => obj::parse(bytes),

@@ -43,6 +43,7 @@ pub use closest::{BvhError, Closest, Feature, TriangleBvh, Vicinity};
 pub use contract::{Contraction, Folds, contract_short_edges, crust_surface};
 pub use creases::{SharpEdge, sharp_edges, smooth_normals};
 pub use format::Format;
+pub(crate) use format::check_encoding;
 pub use inside::{InsideTest, Side, SignedDistance};
 pub use mend::{Components, MendOptions};
 #[cfg(test)]

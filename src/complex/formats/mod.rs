@@ -30,6 +30,7 @@ pub use spheres::{holds_spheres_alone, left_out};
 pub use viewers::{Look, SphereValues, parse_ply};
 
 use super::{ComplexError, MedialMesh};
+use crate::surface::check_encoding;
 use crate::{read_regular, write_atomically};
 
 /// A medial mesh from a file, in canonical form, and the changes that this took.
@@ -175,7 +176,10 @@ pub fn read_content(
     let path = path.as_ref();
     // Editors of some systems write a byte-order mark.
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    parser(path)?(bytes, &path.display().to_string(), options)
+    let name = path.display().to_string();
+    let refused = |why: &str| MaError::of(&name, MaErrorKind::Malformed(why.to_owned()));
+    check_encoding(bytes).map_err(refused)?;
+    parser(path)?(bytes, &name, options)
 }
 
 type Parser<'a> = fn(&'a [u8], &str, ReadOptions) -> Result<LoadedMa, MaError>;

@@ -940,6 +940,13 @@ mod tests {
     }
 
     #[test]
+    fn text_in_two_bytes_a_character_is_named() {
+        let bytes: Vec<u8> = "\u{feff}[]\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let error = read_content("x.json", &bytes, ReadOptions::default()).unwrap_err().to_string();
+        assert!(error.contains("UTF-16"), "{error}");
+    }
+
+    #[test]
     fn layouts_of_other_programs_are_read() {
         let curobo = "robot_cfg:\n  kinematics:\n    collision_spheres:\n      a: &a\n        - \"center\": [0, 0, 1.0e-1]\n          \
                       \"radius\": 0.5 # m\n        - {center: [0, 0, 0], radius: -10}\n      b: []\n";
