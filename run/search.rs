@@ -316,11 +316,11 @@ impl Found {
     /// The message for a bound that no level meets.
     pub fn refusal(&self, bound: f64) -> String {
         let best = self.best.map_or_else(String::new, |Probe { level, spheres, error }| {
-            let count = match level {
-                Level::Spheres(requested) if requested == spheres => String::new(),
-                _ => format!(", which has {spheres} spheres"),
+            let at = match level {
+                Level::Spheres(requested) if requested == spheres => format!("at {level}"),
+                _ => format!("with {spheres} spheres (requested: {level})"),
             };
-            format!(": the lowest error is {} at {level}{count}", percent(error))
+            format!(": the lowest error is {} {at}", percent(error))
         });
         format!(
             "none of {} levels that were tried has a Hausdorff error of at most {} of the diagonal{best}; \
