@@ -38,6 +38,13 @@ const MOST: f64 = 2.0;
 /// Share of a push that a direction without a face is damped by.
 const DAMPING: f64 = 1e-6;
 
+/// Which body is pushed into which. The second order has other vertices that move, and so other gaps.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Order {
+    SmallerIntoLarger,
+    LargerIntoSmaller,
+}
+
 /// A vertex of a pushed body: normals of its faces in contact, and how far each is to move along it.
 type Pushes = Vec<(Vec3, f64)>;
 
@@ -47,10 +54,14 @@ pub(super) fn has_contacts(mesh: &TriMesh, most: f64) -> bool {
     Bodies::new(mesh, most).is_some_and(|bodies| bodies.any())
 }
 
-/// The surface with the smaller of two such bodies pushed into the larger one, with the number of vertices that were moved
-/// and the longest way; None where there are no contacts.
-pub(super) fn pushed(mesh: &TriMesh, most: f64) -> Option<(TriMesh, usize, f64)> {
-    let bodies = Bodies::new(mesh, most).filter(Bodies::any)?;
+/// The surface with the smaller of two such bodies pushed into the larger one, or the other way round, with the number of
+/// vertices that were moved and the longest way; None where there are no contacts.
+pub(super) fn pushed(mesh: &TriMesh, most: f64, order: Order) -> Option<(TriMesh, usize, f64)> {
+    let mut bodies = Bodies::new(mesh, most).filter(Bodies::any)?;
+    if order == Order::LargerIntoSmaller {
+        let last = bodies.rank.iter().flatten().max().copied()?;
+        bodies.rank.iter_mut().flatten().for_each(|rank| *rank = last - *rank);
+    }
     let mut pushed = mesh.clone();
     let (mut vertices, mut farthest) = (0, 0.0_f64);
     for (v, pushes) in bodies.pushes() {
@@ -80,7 +91,7 @@ struct Bodies<'m> {
     tree: TriangleTree,
     /// The body of each face.
     body: Vec<u32>,
-    /// For each body its place among all in the order of their volumes, the largest first; None for cavities.
+    /// For each body its place among all in the order of their volumes, the largest first, unless reversed. None for cavities.
     rank: Vec<Option<usize>>,
 }
 

@@ -11,6 +11,7 @@
 //!    outward, or inward where they are cavities.
 //! 3. *Push*: where leaving out walls does not give a solid, of bodies that stand on each other to within rounding the
 //!    smaller one goes into the larger (`contacts.rs`), with the walls. Cavities as thin as rounding makes them are left out.
+//!    Where the solid has loops or cavities, it is compared with those of other ways to push.
 //! 4. *Resolve*: the winding number, compared with that of the input at points. Repeated while rounding makes faces cross.
 //! 5. *Separate*: parts that touch in a vertex or along an edge.
 
@@ -24,7 +25,7 @@ use manifold_rust::robust::intersection_graph::build_graph;
 use manifold_rust::types::{OpType, WindingRule};
 
 use super::check::orient_and_examine;
-use super::contacts;
+use super::contacts::{self, Order};
 use super::intersections::intersections;
 use super::mend::separate;
 use super::mesh::{TriMesh, Unit};
@@ -82,9 +83,44 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
             return None;
         }
         tried.push(vertices);
-        let mut ways = [Way::WallsAlone, Way::Pushed, Way::Walls].into_iter();
-        ways.find_map(|way| resolved(built.clone(), weld.clone(), unit, checked, way))
+        let by = |way| resolved(built.clone(), weld.clone(), unit, checked, way);
+        // Welded along common edges, bodies hang together where rounding has turned their faces around each other.
+        let unwelded = || {
+            let own: Vec<u32> = (0..soup.vertices.len() as u32).collect();
+            let bodies = build(soup, unit, &own, Duplicates::Kept).ok()?;
+            let are_apart = bodies.topology.is_manifold() && bodies.vertices.len() > vertices;
+            are_apart.then_some(bodies)
+        };
+        let of_bodies = |way| resolved(unwelded()?, None, unit, checked, way);
+        let [usual, other] = [Order::SmallerIntoLarger, Order::LargerIntoSmaller].map(Way::Pushed);
+        let ways: [&dyn Fn() -> Option<Loaded>; 4] = [
+            &|| by(usual).or_else(|| by(Way::Walls)),
+            &|| of_bodies(usual),
+            &|| by(other),
+            &|| of_bodies(other),
+        ];
+        by(Way::WallsAlone).or_else(|| simplest(ways.into_iter().filter_map(|way| way())))
     })
+}
+
+/// The first solid without loops, cavities and vertices drawn apart, or else the one with the fewest. Loops of the bodies
+/// themselves are in all, those that a gap leaves in few.
+fn simplest(mut solids: impl Iterator<Item = Loaded>) -> Option<Loaded> {
+    let faults = |Loaded { report, .. }: &Loaded| {
+        let is_drawn = |repair: &Repair| matches!(repair, Repair::SeparatedVertices { .. });
+        let drawn = usize::from(report.repairs.iter().any(is_drawn));
+        let [bodies, loops, cavities] = report.expected_betti.unwrap_or_default();
+        (loops + cavities + drawn, bodies)
+    };
+    let mut best = solids.next()?;
+    while faults(&best).0 > 0
+        && let Some(solid) = solids.next()
+    {
+        if faults(&solid) < faults(&best) {
+            best = solid;
+        }
+    }
+    Some(best)
 }
 
 /// How touching bodies are joined.
@@ -92,8 +128,8 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
 enum Way {
     /// Walls between them are left out, which gives the solid.
     WallsAlone,
-    /// The smaller body is pushed into the larger one. No wall is left out before, as the rest of it would join both bodies.
-    Pushed,
+    /// Bodies are pushed into each other. No wall is left out before, as the rest of it would join both bodies.
+    Pushed(Order),
     /// Walls are left out.
     Walls,
 }
@@ -109,7 +145,7 @@ fn resolved(
     let diagonal = checked.report.diagonal;
     let mut repairs = checked.report.repairs.clone();
     let drop_walls = |vertices: &mut Vec<Vec3>, faces: &mut Vec<[u32; 3]>| match way {
-        Way::Pushed => None,
+        Way::Pushed(_) => None,
         Way::WallsAlone | Way::Walls => drop_walls(vertices, faces),
     };
     let walls = drop_walls(&mut built.vertices, &mut built.faces);
@@ -139,9 +175,9 @@ fn resolved(
                 return None;
             }
         }
-        Way::Pushed => {
+        Way::Pushed(order) => {
             let push;
-            (mesh, push) = pushed_together(&mesh, unit)?;
+            (mesh, push) = pushed_together(&mesh, unit, order)?;
             repairs.push(push);
         }
         Way::Walls => {}
@@ -294,9 +330,9 @@ pub(super) fn has_contacts(mesh: &TriMesh, unit: Unit) -> bool {
 }
 
 /// The surface with such bodies pushed into each other.
-fn pushed_together(mesh: &TriMesh, unit: Unit) -> Option<(TriMesh, Repair)> {
+fn pushed_together(mesh: &TriMesh, unit: Unit, order: Order) -> Option<(TriMesh, Repair)> {
     let (apart, most) = apart(mesh, unit);
-    let (mut mesh, vertices, distance) = contacts::pushed(&apart, most)?;
+    let (mut mesh, vertices, distance) = contacts::pushed(&apart, most, order)?;
     mesh.vertices.iter_mut().for_each(|v| *v = unit.restore(*v));
     let distance = unit.backward(distance, 1).unwrap_or_default();
     Some((mesh, Repair::PushedVertices { vertices, distance }))

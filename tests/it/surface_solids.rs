@@ -464,6 +464,35 @@ fn cubes_cut_in_single_precision_are_one_body() {
 }
 
 #[test]
+fn brick_walls_cut_by_a_plane_are_one_body() {
+    let mut random = Pcg64::seed_from_u64(41);
+    for case in 0..60 {
+        // Pieces on both sides of the cut have corners in common, and other bricks stand on their edges.
+        let slopes = [(); 2].map(|()| random.random_range(-0.9..0.9));
+        let mut pieces = Vec::new();
+        for low in [0.0, 0.5] {
+            let [first, last] = [random.random_range(0.4..0.9), random.random_range(3.1..3.6)];
+            let joints = [(0.0, 0.0), (first, 0.0), (2.0, 1.0), (last, 0.0), (4.0, 0.0)];
+            for pair in joints.windows(2) {
+                pieces.push(moved(cube(), |v| {
+                    let [y, z] = [v.y, low + 0.5 * v.z];
+                    let slope = slopes[0] * (y - 0.5) + slopes[1] * (z - 0.5);
+                    let [left, right] = [pair[0], pair[1]].map(|(at, share)| at + share * slope);
+                    Vec3::new(left + v.x * (right - left), y, z)
+                }));
+            }
+        }
+        let axis = Vec3::from([(); 3].map(|()| random.random_range(-1.0..1.0))).normalize();
+        let turn = DMat3::from_axis_angle(axis, random.random_range(0.0..TAU));
+        let single = |v: Vec3| Vec3::from((turn * v).to_array().map(|x| f64::from(x as f32)));
+        let report = read(&moved(joined(&pieces), single)).report;
+        assert_eq!(report.expected_betti, Some([1, 0, 0]), "{case}: {report:?}");
+        let found = report.volume.expect("closed");
+        assert!((found - 4.0).abs() < 4e-4, "{case}: {found}");
+    }
+}
+
+#[test]
 fn a_wedge_in_its_groove_reaches_no_other_body() {
     let turn = DMat3::from_rotation_y(0.4) * DMat3::from_rotation_x(0.7);
     let prism = |profile: &[[f64; 2]], faces: &[[u32; 3]]| {
