@@ -15,7 +15,7 @@
 //! 4. *Resolve*: the winding number, compared with that of the input at points. Repeated while rounding makes faces cross.
 //! 5. *Separate*: parts that touch in a vertex or along an edge.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::panic::catch_unwind;
 
 use manifold_rust::linalg;
@@ -86,10 +86,10 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
         let by = |way| resolved(built.clone(), weld.clone(), unit, checked, way);
         // Welded along common edges, bodies hang together where rounding has turned their faces around each other.
         let unwelded = || {
-            let own: Vec<u32> = (0..soup.vertices.len() as u32).collect();
-            let bodies = build(soup, unit, &own, Duplicates::Kept).ok()?;
-            let are_apart = bodies.topology.is_manifold() && bodies.vertices.len() > vertices;
-            are_apart.then_some(bodies)
+            let bodies = in_runs(&built)?;
+            let own: Vec<u32> = (0..bodies.vertices.len() as u32).collect();
+            let bodies = build(&bodies, unit, &own, Duplicates::Kept).ok()?;
+            bodies.topology.is_manifold().then_some(bodies)
         };
         let of_bodies = |way| resolved(unwelded()?, None, unit, checked, way);
         let [usual, other] = [Order::SmallerIntoLarger, Order::LargerIntoSmaller].map(Way::Pushed);
@@ -101,6 +101,36 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
         ];
         by(Way::WallsAlone).or_else(|| simplest(ways.into_iter().filter_map(|way| way())))
     })
+}
+
+/// The triangles with vertices of their own for each of several closed surfaces that follow each other: files list body after
+/// body. None for others.
+fn in_runs(Repaired { vertices, faces, .. }: &Repaired) -> Option<PolygonSoup> {
+    let (mut apart, mut of_run) = (Vec::new(), HashMap::new());
+    let mut corners = Vec::with_capacity(faces.len());
+    let (mut open, mut runs) = (HashMap::new(), 0);
+    for &face in faces {
+        corners.push(face.map(|v| {
+            *of_run.entry(v).or_insert_with(|| {
+                apart.push(vertices[v as usize]);
+                apart.len() as u32 - 1
+            })
+        }));
+        let [a, b, c] = face;
+        for [a, b] in [[a, b], [b, c], [c, a]] {
+            match open.get_mut(&[b, a]) {
+                Some(1) => drop(open.remove(&[b, a])),
+                Some(others) => *others -= 1,
+                None => *open.entry([a, b]).or_insert(0) += 1,
+            }
+        }
+        if open.is_empty() {
+            of_run.clear();
+            runs += 1;
+        }
+    }
+    let soup = (runs > 1 && open.is_empty()).then(|| PolygonSoup::of_triangles(&apart, &corners));
+    soup?.ok()
 }
 
 /// The first solid without loops, cavities and vertices drawn apart, or else the one with the fewest. Loops of the bodies
