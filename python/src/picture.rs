@@ -11,7 +11,7 @@ use medial_run::record::Record;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde::Deserialize;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::axis::Axis;
 use crate::calls::{Call, Failure, Kind, long};
@@ -95,8 +95,25 @@ pub fn render<'py>(
 /// The table `results.csv` of one record, a JSON object.
 #[pyfunction]
 pub fn results_row(record: &str) -> PyResult<String> {
-    let record: Record = serde_json::from_str(record)
-        .map_err(|error| Failure::new(Kind::Internal, format!("record: {error}")))?;
+    // One mesh has no machine, no seeds and no conditions of a comparison.
+    let parsed = || -> serde_json::Result<Record> {
+        let mut whole = serde_json::to_value(Record::default())?;
+        overlay(&mut whole, serde_json::from_str(record)?);
+        serde_json::from_value(whole)
+    };
+    let record =
+        parsed().map_err(|error| Failure::new(Kind::Internal, format!("record: {error}")))?;
     let csv = results_csv(&[record]).map_err(|error| Failure::new(Kind::Internal, error))?;
     Ok(String::from_utf8_lossy(&csv).into_owned())
+}
+
+/// Replaces the values of an object by those of another one, also within objects of both.
+fn overlay(whole: &mut Value, part: Value) {
+    match (whole, part) {
+        (Value::Object(whole), Value::Object(part)) => {
+            part.into_iter()
+                .for_each(|(key, value)| overlay(whole.entry(key).or_insert(Value::Null), value));
+        }
+        (whole, part) => *whole = part,
+    }
 }
