@@ -6,7 +6,7 @@ use std::hash::BuildHasherDefault;
 use rayon::prelude::*;
 
 use super::ConformingError;
-use super::stars::{any_has, star};
+use super::stars::{missing_around, star};
 use crate::Vec3;
 use crate::geometry::hash::KeyHasher;
 use crate::geometry::predicates::{Sign, orient2d, project, projection_axis};
@@ -263,10 +263,8 @@ impl Skin {
         of_vertex.dedup();
         let groups: Vec<&[(u32, u32)]> = of_vertex.chunk_by(|a, b| a.0 == b.0).collect();
         let missing = groups.par_iter().with_min_len(64).flat_map_iter(|group| {
-            let star = star(delaunay, group[0].0);
-            let is_missing =
-                move |&(_, t): &(u32, u32)| !any_has(delaunay, &star, self.triangles[t as usize]);
-            group.iter().copied().filter(is_missing).map(|(_, t)| t)
+            let triangles = group.iter().map(|&(_, t)| (t, self.triangles[t as usize]));
+            missing_around(delaunay, group[0].0, triangles)
         });
         let mut missing: Vec<u32> = missing.collect();
         missing.sort_unstable();
