@@ -27,7 +27,7 @@ use crate::complex::{MedialUnion, NearestPrimitive};
 use crate::geometry::trees::{PointTree, in_morton_order};
 
 /// Limit of primitives left one after the other.
-const MAX_EXITS: usize = 12;
+const MAX_EXITS: usize = 64;
 
 /// Limit of pieces in all searches for the largest depth. Then it is a lower bound only.
 const MAX_PIECES: usize = 1 << 21;

@@ -38,6 +38,9 @@ use crate::Vec3;
 use crate::complex::{MedialMesh, MedialUnion};
 use crate::surface::{TriMesh, TriangleBvh};
 
+/// Least number of samples of a boundary that distances to it are taken from.
+const LEAST_ENVELOPE: usize = 50_000;
+
 /// Samples of the boundary of a union, with their distances from the surface.
 pub(super) struct Envelope {
     pub points: Vec<Vec3>,
@@ -59,7 +62,12 @@ pub(super) fn distances_with_envelope(
     let (depths, mu): (Vec<_>, Vec<_>) = boundary.readings(&samples.points).into_iter().unzip();
     let envelope = EnvelopeOptions { samples: count, burial: BURIAL * pose.diameter(), seed };
     let sampled = sample_envelope_in(pose, mesh, union, &envelope)?;
-    let depths = boundary.values(&samples.points, &depths, &sampled.points);
+    // Of few samples the nearest one is far from a buried point, whatever the distance to the boundary is.
+    let is_sparse = count < LEAST_ENVELOPE && !depths.iter().all(|depth| boundary.is_exact(depth));
+    let dense = EnvelopeOptions { samples: LEAST_ENVELOPE, ..envelope };
+    let dense = is_sparse.then(|| sample_envelope_in(pose, mesh, union, &dense)).transpose()?;
+    let nearest = dense.as_ref().unwrap_or(&sampled);
+    let depths = boundary.values(&samples.points, &depths, &nearest.points);
     let balls = MedialUnion::of_spheres(&mesh.spheres)?;
     let spheres = absolute(balls.signed_batch(&samples.points));
     let start = Start::new(samples, &depths);
