@@ -104,6 +104,8 @@ struct Triangulated {
     is_inside: Result<Vec<bool>, Option<String>>,
     /// Doubt about the topology of the cells inside.
     doubt: Option<String>,
+    /// Whether balls close a part of the surface in gaps.
+    closes_gaps: bool,
 }
 
 impl Triangulated {
@@ -120,14 +122,20 @@ impl Triangulated {
             _ => Err(ConformingError::Crossing),
         };
         match found {
-            Ok(Conforming { delaunay, is_inside, missing, .. }) => {
+            Ok(Conforming { delaunay, is_inside, missing, narrow_gaps, .. }) => {
                 let doubt = (missing > 0).then(|| {
                     format!(
                         "the initial medial mesh may have another topology than the solid: parts of the surface are too \
                          close to each other for samples ({missing} faces); {ADVICE}"
                     )
                 });
-                Ok(Self { delaunay: Arc::new(delaunay), is_inside: Ok(is_inside), doubt })
+                let closes_gaps = narrow_gaps > FAR_START * FAR_START;
+                Ok(Self {
+                    delaunay: Arc::new(delaunay),
+                    is_inside: Ok(is_inside),
+                    doubt,
+                    closes_gaps,
+                })
             }
             Err(ConformingError::Triangulation(error)) => Err(error),
             Err(why) => {
@@ -142,7 +150,7 @@ impl Triangulated {
 
     fn plain(samples: &[Vec3]) -> Result<Self, TriangulationError> {
         let delaunay = Arc::new(Delaunay::new(samples)?);
-        Ok(Self { delaunay, is_inside: Err(None), doubt: None })
+        Ok(Self { delaunay, is_inside: Err(None), doubt: None, closes_gaps: false })
     }
 }
 
@@ -155,6 +163,9 @@ const FAR_START: f64 = 0.02;
 /// What helps where parts of a surface are too close to each other.
 const ADVICE: &str = "give more samples (`--sampling conforming:N`), or wrap the surface (`medial repair --wrap`), which \
                       closes gaps narrower than 2 % of the diagonal";
+
+/// What makes the solid itself closed there.
+const WRAP: &str = "the errors are those of a solid without them if the surface is wrapped before (`medial repair --wrap`)";
 
 /// Number of spheres that share the deepest place found so far.
 const REACH_CHUNK: usize = 4_096;
@@ -503,6 +514,14 @@ impl Shape {
             changes.map(|repair| format!("repaired: {repair}")).collect();
         remarks.extend(report.warnings.iter().cloned());
         remarks.extend(self.sampling_warning());
+        let triangulated =
+            self.store.of_samples.delaunay.get().and_then(|(found, _)| found.as_ref().ok());
+        if triangulated.is_some_and(|found| found.closes_gaps) {
+            remarks.push(format!(
+                "spheres of the initial medial mesh close gaps of the solid that are narrower than 0.03 % of the diagonal; \
+                 {WRAP}"
+            ));
+        }
         let reach = self.reach().filter(|&reach| reach > FAR_START);
         remarks.extend(reach.map(|reach| {
             let percent = 100.0 * reach;

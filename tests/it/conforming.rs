@@ -224,6 +224,30 @@ fn starts_around_concave_edges_at_any_angle_end_near_them() {
     }
 }
 
+/// A block with a slot of some width, above a floor that is nearer to the balls beside the slot than its walls.
+fn slotted(width: f64) -> TriMesh {
+    let planes = [vec![0.0, 2.0, 2.0 + width, 4.0], vec![0.0, 3.0], vec![0.0, 0.4, 2.0]];
+    shapes::cells(&planes, |[x, _, z]| x != 1 || z != 1)
+}
+
+#[test]
+fn narrow_slots_are_kept_open_or_named() {
+    for (width, is_named) in [(0.01, false), (0.003, false), (0.0003, true)] {
+        let solid = slotted(width);
+        let (_, start) = right_start("slot", &solid);
+        let shape = shape_of(&solid, Sampling::default());
+        shape.initial().unwrap();
+        let remarks = shape.remarks();
+        assert_eq!(
+            remarks.iter().any(|remark| remark.contains("close gaps")),
+            is_named,
+            "{width}: {remarks:?}"
+        );
+        let far = error_of(&shape, &start);
+        assert!(is_named || far < 0.025, "{width}: {far}");
+    }
+}
+
 #[test]
 fn a_start_that_leaves_parts_bare_is_named() {
     // A needle in pieces that are too short for a coarse surface.

@@ -123,6 +123,9 @@ pub struct Conforming {
     pub rounds: usize,
     /// Number of faces that the triangulation does not contain: then the topology of its cells may differ from the solid's.
     pub missing: usize,
+    /// Area of the surface at gaps narrower than 3e-4 of the diagonal, as a share of the squared diagonal: balls on both sides
+    /// close them. Zero on dense surfaces, which are not searched.
+    pub narrow_gaps: f64,
 }
 
 /// Why a surface has no such triangulation.
@@ -193,15 +196,17 @@ impl Conforming {
             }
         }
         let mut refinement = kept.ok_or(failure)?;
+        let mut narrow_gaps = 0.0;
         if (is_coarse || refinement.has_protrusions(FAR))
             && let Ok(tree) = TriangleBvh::new(surface)
         {
             refinement.approach(&tree, false);
             if is_coarse {
                 refinement.approach(&tree, true);
+                narrow_gaps = refinement.narrow_gaps(&tree);
             }
         }
-        Ok(refinement.finish())
+        Ok(Self { narrow_gaps, ..refinement.finish() })
     }
 }
 
@@ -280,7 +285,7 @@ impl Refinement {
             specks::mend_loops(&delaunay, &mut is_inside, &skin, &missing, betti);
         }
         let added = skin.points.len() - vertices;
-        Conforming { delaunay, is_inside, added, rounds, missing: missing.len() }
+        Conforming { delaunay, is_inside, added, rounds, missing: missing.len(), narrow_gaps: 0.0 }
     }
 
     /// Step 6: adds points until all balls end near the surface or the limit is reached; on coarse surfaces also until they

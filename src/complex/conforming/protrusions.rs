@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::Refinement;
 use super::skin::{Place, Skin, key, sides};
+use super::{CLOSE, Refinement};
 use crate::Vec3;
 use crate::complex::Sphere;
 use crate::geometry::CellId;
@@ -58,7 +58,10 @@ impl Refinement {
         let depth = depth * self.skin.diagonal;
         let least = if keeps_gaps { LEAST * depth } else { depth };
         let mut protrusions = self.protrusions(least, depth);
-        protrusions.retain(|ball| ball.depth > depth || self.closes_gap(ball, surface));
+        protrusions.retain(|ball| ball.depth > depth);
+        if keeps_gaps {
+            protrusions.extend(self.closing_gaps(least, surface));
+        }
         // The deepest first.
         protrusions.sort_by(|a, b| b.depth.total_cmp(&a.depth));
         let mut fresh = PointGrid::new(depth);
@@ -161,6 +164,63 @@ impl Refinement {
             && outward.dot(nearest.point - tip).abs() > 0.5 * nearest.distance
     }
 
+    /// Area of the surface at gaps that are too narrow for [`Self::closing_gaps`], as a share of the squared diagonal.
+    pub fn narrow_gaps(&self, surface: &TriangleBvh) -> f64 {
+        let Self { skin, .. } = self;
+        let depth = LEAST * CLOSE * skin.diagonal;
+        let areas = (0..skin.triangles.len() as u32).into_par_iter().filter_map(|triangle| {
+            let [a, b, c] = skin.corners(triangle);
+            let foot = (a + b + c) / 3.0;
+            let tip = Protrusion { depth, centre: foot, radius: depth, foot, triangle };
+            let area = 0.5 * (b - a).cross(c - a).length();
+            self.closes_gap(&tip, surface).then_some(area)
+        });
+        // The order of a sum in parallel depends on the number of threads.
+        let areas: Vec<f64> = areas.collect();
+        areas.into_iter().sum::<f64>() / skin.diagonal.powi(2)
+    }
+
+    /// For each ball inside the deepest place where it closes a gap, and is deeper than `least`. The nearest part of the
+    /// surface may be another one.
+    fn closing_gaps(&self, least: f64, surface: &TriangleBvh) -> Vec<Protrusion> {
+        let Some((large, tree)) = self.large_triangles(least) else { return Vec::new() };
+        let spheres = self.delaunay.circumspheres();
+        let inside = spheres.par_iter().zip(&self.is_inside).filter(|&(_, &is_inside)| is_inside);
+        let found = inside.filter_map(|(sphere, _)| {
+            let Sphere { centre, radius } = (*sphere).filter(|sphere| sphere.radius > least)?;
+            let mut deepest: Option<Protrusion> = None;
+            tree.each_within(centre, radius - least, |face, foot| {
+                let depth = radius - centre.distance(foot);
+                let triangle = large[face as usize];
+                let ball = Protrusion { depth, centre, radius, foot, triangle };
+                let is_deeper = deepest.as_ref().is_none_or(|deepest| deepest.depth < depth);
+                if is_deeper && self.closes_gap(&ball, surface) {
+                    deepest = Some(ball);
+                }
+            });
+            deepest
+        });
+        found.collect()
+    }
+
+    /// Plane triangles that a ball without vertices inside can pass deeper than `depth`, with their tree.
+    fn large_triangles(&self, depth: f64) -> Option<(Vec<u32>, TriangleBvh)> {
+        let skin = &self.skin;
+        // A ball without vertices inside reaches beyond a triangle no deeper than the triangle's points are far from its
+        // corners, which is at most the longest side divided by the root of three.
+        let is_large = |t: &u32| {
+            let squared = sides(skin.triangles[*t as usize])
+                .map(|edge| edge.map(|v| skin.points[v as usize]))
+                .map(|[a, b]| a.distance_squared(b));
+            let is_flat = skin.plane[skin.patch[*t as usize] as usize].is_some();
+            is_flat && squared.into_iter().any(|squared| squared > 3.0 * depth * depth)
+        };
+        let large: Vec<u32> = (0..skin.triangles.len() as u32).filter(is_large).collect();
+        let corners: Vec<[Vec3; 3]> = large.iter().map(|&t| skin.corners(t)).collect();
+        let tree = TriangleBvh::from_triangles(&corners).ok()?;
+        Some((large, tree))
+    }
+
     /// Balls deeper than `depth`, and circles with a radius above `wide` where the solid is thin.
     fn protrusions(&self, depth: f64, wide: f64) -> Vec<Protrusion> {
         let found = self.all_protrusions(depth, wide);
@@ -196,18 +256,7 @@ impl Refinement {
     /// Balls and circles anywhere, circles with their cells.
     fn all_protrusions(&self, depth: f64, wide: f64) -> Vec<(Option<CellId>, Protrusion)> {
         let Self { skin, delaunay, is_inside, .. } = self;
-        // A ball without vertices inside reaches beyond a triangle no deeper than the triangle's points are far from its
-        // corners, which is at most the longest side divided by the root of three.
-        let is_large = |t: &u32| {
-            let squared = sides(skin.triangles[*t as usize])
-                .map(|edge| edge.map(|v| skin.points[v as usize]))
-                .map(|[a, b]| a.distance_squared(b));
-            let is_flat = skin.plane[skin.patch[*t as usize] as usize].is_some();
-            is_flat && squared.into_iter().any(|squared| squared > 3.0 * depth * depth)
-        };
-        let large: Vec<u32> = (0..skin.triangles.len() as u32).filter(is_large).collect();
-        let corners: Vec<[Vec3; 3]> = large.iter().map(|&t| skin.corners(t)).collect();
-        let Ok(tree) = TriangleBvh::from_triangles(&corners) else { return Vec::new() };
+        let Some((large, tree)) = self.large_triangles(depth) else { return Vec::new() };
         let spheres = delaunay.circumspheres();
         let all = (0..spheres.len() as u32).into_par_iter().zip(&spheres).zip(is_inside);
         let balls = all.filter(|&(_, &is_inside)| is_inside).map(|(ball, _)| ball);
@@ -221,7 +270,7 @@ impl Refinement {
                 let ball = Protrusion { depth: reach, centre, radius, foot, triangle };
                 return Some((None, ball));
             }
-            let [a, b, c] = corners[nearest.face as usize];
+            let [a, b, c] = skin.corners(triangle);
             let outward = (b - a).cross(c - a).normalize_or_zero();
             let height = outward.dot(centre - foot);
             let width = (radius * radius - height * height).sqrt();
