@@ -93,7 +93,7 @@ fn mended(inspection: Inspection, options: MendOptions) -> Result<Loaded, Surfac
     if options.fill_holes {
         let TriMesh { vertices, faces } = &mut mesh;
         // The loops of holes pass a vertex once only if its fans are separate.
-        repairs.extend(separate(vertices, faces));
+        repairs.extend(separate(vertices, faces, Stays::Flattest));
         repairs.extend(fill(vertices, faces)?);
     }
     // After holes are filled: an open component bounds no cavity, and has none.
@@ -410,8 +410,20 @@ const STEP: f64 = 1e-3;
 /// Corners (`3 face + k`) of the faces that hang together around one vertex.
 type Fan = Vec<usize>;
 
+/// Which fan keeps its vertex.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stays {
+    Flattest,
+    /// Of a cavity that touches the surface around it.
+    Sharpest,
+}
+
 /// Gives each fan of faces a separate vertex.
-pub(super) fn separate(vertices: &mut Vec<Vec3>, faces: &mut [[u32; 3]]) -> Option<Repair> {
+pub(super) fn separate(
+    vertices: &mut Vec<Vec3>,
+    faces: &mut [[u32; 3]],
+    stays: Stays,
+) -> Option<Repair> {
     let (mut touching, mut largest_move) = (0, 0.0_f64);
     for (vertex, mut fans) in fans(vertices, faces).into_iter().enumerate() {
         if fans.len() < 2 {
@@ -422,8 +434,12 @@ pub(super) fn separate(vertices: &mut Vec<Vec3>, faces: &mut [[u32; 3]]) -> Opti
         let rims = fans.values().map(|fan| rim_mean(vertices, faces, fan));
         let targets: Vec<Vec3> = rims.map(|rim| tip * (1.0 - STEP) + rim * STEP).collect();
         let heights: Vec<f64> = targets.iter().map(|&at| tip.distance_squared(at)).collect();
-        let flattest = (0..fans.len()).min_by(|&a, &b| heights[a].total_cmp(&heights[b]));
-        for (k, fan) in fans.values_mut().enumerate().filter(|&(k, _)| Some(k) != flattest) {
+        let compare = |&a: &usize, &b: &usize| heights[a].total_cmp(&heights[b]);
+        let kept = match stays {
+            Stays::Flattest => (0..fans.len()).min_by(compare),
+            Stays::Sharpest => (0..fans.len()).max_by(compare),
+        };
+        for (k, fan) in fans.values_mut().enumerate().filter(|&(k, _)| Some(k) != kept) {
             let own = vertices.len() as u32;
             largest_move = largest_move.max(tip.distance(targets[k]));
             vertices.push(targets[k]);
@@ -431,6 +447,28 @@ pub(super) fn separate(vertices: &mut Vec<Vec3>, faces: &mut [[u32; 3]]) -> Opti
         }
     }
     (touching > 0).then_some(Repair::SeparatedVertices { vertices: touching, largest_move })
+}
+
+/// Halves the edges of more than two faces. The new vertices can be separated also where the faces hang together around both
+/// ends.
+pub(super) fn halve_shared_edges(vertices: &mut Vec<Vec3>, faces: &mut Vec<[u32; 3]>) {
+    let mut count: BTreeMap<[u32; 2], usize> = BTreeMap::new();
+    for &[a, b, c] in &*faces {
+        for [a, b] in [[a, b], [b, c], [c, a]] {
+            *count.entry([a.min(b), a.max(b)]).or_default() += 1;
+        }
+    }
+    for [a, b] in count.into_iter().filter(|&(_, faces)| faces > 2).map(|(edge, _)| edge) {
+        let middle = vertices.len() as u32;
+        vertices.push(vertices[a as usize].midpoint(vertices[b as usize]));
+        for face in 0..faces.len() {
+            let corners = faces[face];
+            if corners.contains(&a) && corners.contains(&b) {
+                faces[face] = corners.map(|v| if v == a { middle } else { v });
+                faces.push(corners.map(|v| if v == b { middle } else { v }));
+            }
+        }
+    }
 }
 
 /// For each vertex its fans. Those of parts that touch along an edge count as one where the surface is open there.

@@ -27,7 +27,7 @@ use manifold_rust::types::{OpType, WindingRule};
 use super::check::orient_and_examine;
 use super::contacts::{self, Order};
 use super::intersections::intersections;
-use super::mend::separate;
+use super::mend::{Stays, halve_shared_edges, separate};
 use super::mesh::{TriMesh, Unit};
 use super::parts::{ASIDE, PLACE, Parted, parted, split_at_vertices, walls};
 use super::repair::{Duplicates, Repaired, build, compact, repair, weld_within};
@@ -229,9 +229,7 @@ fn resolved(
     let is_wall = |repair: &Repair| matches!(repair, Repair::DroppedDuplicateFaces { .. });
     if !found.report.self_intersecting && !found.report.repairs.iter().any(is_wall) {
         // Parts touch in common vertices and edges alone: nothing has to be arranged.
-        let TriMesh { mut vertices, mut faces } = mesh.clone();
-        let separated = separate(&mut vertices, &mut faces);
-        let found = examined(&TriMesh { vertices, faces })?;
+        let (found, separated) = drawn_apart(&mesh)?;
         if is_solid(&found) {
             repairs.extend(separated);
             return Some(loaded(found, repairs));
@@ -324,9 +322,7 @@ fn without_slits(mut mesh: TriMesh, unit: Unit) -> (TriMesh, Option<Repair>) {
 fn closed(arranged: &TriMesh, unit: Unit, diagonal: f64) -> Option<Closed> {
     let (mut found, mut separated, mut contracted) = (examined(arranged)?, None, None);
     if !is_solid(&found) {
-        let (mut vertices, mut faces) = touching(arranged.clone());
-        separated = separate(&mut vertices, &mut faces);
-        found = examined(&TriMesh { vertices, faces })?;
+        (found, separated) = drawn_apart(&touching(arranged.clone()))?;
     }
     if found.refused.is_none() {
         let distance = SHORT * diagonal;
@@ -421,13 +417,32 @@ fn loaded(Inspection { mesh, mut report, .. }: Inspection, repairs: Vec<Repair>)
 }
 
 /// The vertices and faces of a mesh whose parts share a vertex wherever one touches another with a vertex.
-fn touching(TriMesh { vertices, mut faces }: TriMesh) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+fn touching(TriMesh { vertices, mut faces }: TriMesh) -> TriMesh {
     let welds = weld_within(&vertices, 0.0);
     faces.as_flattened_mut().iter_mut().for_each(|v| *v = welds[*v as usize]);
     faces.retain(|&[a, b, c]| a != b && b != c && c != a);
     let points = Unit::of(&vertices).forward_all(&vertices);
     let faces = split_at_vertices(&points, &faces);
-    (vertices, faces)
+    TriMesh { vertices, faces }
+}
+
+/// A surface whose parts are separated where they touch: the first way that gives a solid, or else the first. With the
+/// displacement.
+fn drawn_apart(mesh: &TriMesh) -> Option<(Inspection, Option<Repair>)> {
+    let ways = [(false, Stays::Flattest), (true, Stays::Flattest), (true, Stays::Sharpest)];
+    let mut tried = ways.into_iter().filter_map(|(halves, stays)| {
+        let TriMesh { mut vertices, mut faces } = mesh.clone();
+        if halves {
+            halve_shared_edges(&mut vertices, &mut faces);
+        }
+        let separated = separate(&mut vertices, &mut faces, stays);
+        Some((examined(&TriMesh { vertices, faces })?, separated))
+    });
+    let first = tried.next()?;
+    if is_solid(&first.0) {
+        return Some(first);
+    }
+    Some(tried.find(|(found, _)| is_solid(found)).unwrap_or(first))
 }
 
 /// The enclosed volume in scaled units.

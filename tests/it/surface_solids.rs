@@ -495,6 +495,15 @@ fn brick_walls_cut_by_a_plane_are_one_body() {
     }
 }
 
+#[test]
+fn columns_that_touch_along_a_whole_edge_are_drawn_apart() {
+    // Between two plates, so that the surface hangs together around both ends of the edge.
+    let planes = [vec![0.0, 1.0, 2.0], vec![0.0, 1.0, 2.0], vec![0.0, 1.0, 2.0, 3.0]];
+    let report = read(&cells(&planes, |[x, y, z]| z != 1 || x == y)).report;
+    assert_eq!(report.expected_betti, Some([1, 1, 0]), "{report:?}");
+    assert!((report.volume.unwrap() - 10.0).abs() < 0.01, "{report:?}");
+}
+
 fn read_stl(mesh: &TriMesh) -> Loaded {
     let mut stl = "solid\n".to_owned();
     for corners in (0..mesh.faces.len()).map(|face| mesh.triangle(face)) {
