@@ -37,9 +37,13 @@ pub fn write_atomically(
     builder.prefix(".medial-").suffix(".tmp");
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let temporary = builder.tempfile_in(folder.unwrap_or(Path::new(".")))?;
+    // Listed as soon as it is there: a signal may come between.
+    let temporary = live(|paths| {
+        let temporary = builder.tempfile_in(folder.unwrap_or(Path::new(".")))?;
+        paths.push(temporary.path().to_owned());
+        io::Result::Ok(temporary)
+    })?;
     let path = temporary.path().to_owned();
-    live(|paths| paths.push(path.clone()));
     let written = complete(temporary, &target, replaced, content);
     live(|paths| paths.retain(|other| *other != path));
     written
@@ -56,9 +60,9 @@ pub fn remove_temporaries() {
     });
 }
 
-fn live(change: impl FnOnce(&mut Vec<PathBuf>)) {
+fn live<T>(change: impl FnOnce(&mut Vec<PathBuf>) -> T) -> T {
     // A list of paths is whole after any panic.
-    change(&mut LIVE.lock().unwrap_or_else(PoisonError::into_inner));
+    change(&mut LIVE.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
 fn complete(

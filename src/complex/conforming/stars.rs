@@ -3,7 +3,6 @@
 use std::collections::{HashMap, HashSet};
 use std::hash::BuildHasherDefault;
 
-use super::skin::ascending;
 use crate::geometry::hash::KeyHasher;
 use crate::geometry::triangulation::Triangulation;
 use crate::geometry::{CellId, Delaunay, VertexId};
@@ -57,7 +56,7 @@ fn links(delaunay: &Delaunay, vertex: u32, star: &[CellId]) -> Vec<[u32; 2]> {
     let of_cell = |&cell: &CellId| {
         let v = delaunay.vertices(cell).map(|v| v.0);
         let [a, b, c] = std::array::from_fn(|k| v[k + usize::from(v[..=k].contains(&vertex))]);
-        [[a, b], [a, c], [b, c]].map(ascending)
+        [[a, b], [a, c], [b, c]].map(|[a, b]| [a.min(b), a.max(b)])
     };
     let mut links: Vec<[u32; 2]> = star.iter().flat_map(of_cell).collect();
     links.sort_unstable();
@@ -80,8 +79,8 @@ pub(super) fn missing_around(
         None => !any_has(delaunay, &star, corners),
         Some(links) => {
             let k = corners.iter().position(|&v| v == vertex).expect("a common corner");
-            let link = ascending([corners[(k + 1) % 3], corners[(k + 2) % 3]]);
-            links.binary_search(&link).is_err()
+            let [a, b] = [corners[(k + 1) % 3], corners[(k + 2) % 3]];
+            links.binary_search(&[a.min(b), a.max(b)]).is_err()
         }
     };
     triangles.filter(|&(_, corners)| is_missing(corners)).map(|(t, _)| t).collect()
