@@ -171,9 +171,14 @@ impl Refinement {
         let areas = (0..skin.triangles.len() as u32).into_par_iter().filter_map(|triangle| {
             let [a, b, c] = skin.corners(triangle);
             let foot = (a + b + c) / 3.0;
-            let tip = Protrusion { depth, centre: foot, radius: depth, foot, triangle };
             let area = 0.5 * (b - a).cross(c - a).length();
-            self.closes_gap(&tip, surface).then_some(area)
+            // A tip far beyond the other side does not see it.
+            let mut depths = [1.0, 0.2, 0.04].into_iter().map(|share| share * depth);
+            let is_narrow = depths.any(|depth| {
+                let tip = Protrusion { depth, centre: foot, radius: depth, foot, triangle };
+                self.closes_gap(&tip, surface)
+            });
+            is_narrow.then_some(area)
         });
         // The order of a sum in parallel depends on the number of threads.
         let areas: Vec<f64> = areas.collect();
