@@ -330,8 +330,8 @@ fn missed(bound: f64, found: &Found, advice: &str) -> LevelRun {
 /// Runs of a method that holds bounds by itself, until its result is within the bound by the measure of the search.
 const DIRECT_RUNS: usize = 4;
 
-/// The largest ratio of the native levels of two such runs.
-const DIRECT_STEP: f64 = 0.97;
+/// The smallest and the largest ratio of the native levels of two such runs.
+const DIRECT_STEPS: [f64; 2] = [0.5, 0.97];
 
 /// A search for levels within error bounds.
 pub struct Bounds<'a> {
@@ -425,7 +425,12 @@ impl Bounds<'_> {
                 .into_iter()
                 .flatten()
                 .min_by(|a, b| a.error.total_cmp(&b.error));
-            level *= (bound / error).min(DIRECT_STEP);
+            let [least, most] = DIRECT_STEPS;
+            level *= (bound / error).min(most).max(least);
+            self.budget.has_level.set(true);
+            if let Some(fault) = self.budget.used_up() {
+                return Err(fault);
+            }
         }
         let found = Found { within: None, best, tried: DIRECT_RUNS };
         Ok((missed(bound, &found, ""), Some(found)))
@@ -441,7 +446,7 @@ impl Bounds<'_> {
         loop {
             let mut found = guarded(|| search.within(bound))?;
             let Some(probe) = found.within else {
-                let advice = "; `tight` reaches lower errors";
+                let advice = ", or try another method, such as `tight`";
                 return Ok((missed(bound, &found, advice), Some(found)));
             };
             let run = self.timed(probe.level, bound);

@@ -12,7 +12,7 @@ mod union;
 pub mod union_axis;
 mod voronoi;
 
-pub use bulges::without_bulges;
+pub(crate) use bulges::without_bulges;
 pub use conforming::{Conforming, ConformingError};
 pub use contour::{ContourError, UnionSurface, union_surface, union_surface_within};
 pub use formats::{

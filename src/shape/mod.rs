@@ -91,8 +91,8 @@ struct OfSamples {
     cells: Slot<Arc<CellSpheres>>,
     centred: Slot<Arc<CellSpheres>>,
     facets: Slot<Arc<VoronoiFacets>>,
-    medial: Slot<Arc<MedialMesh>>,
-    initial: Slot<Arc<MedialMesh>>,
+    /// The Voronoi medial mesh, and the one that methods start from.
+    medial: Slot<[Arc<MedialMesh>; 2]>,
     balls: Slot<Arc<InnerBalls>>,
 }
 
@@ -163,9 +163,6 @@ const FAR_START: f64 = 0.02;
 /// What helps where parts of a surface are too close to each other.
 const ADVICE: &str = "give more samples (`--sampling conforming:N`), or wrap the surface (`medial repair --wrap`), which \
                       closes gaps narrower than 2 % of the diagonal";
-
-/// What makes the solid itself closed there.
-const WRAP: &str = "the errors are those of a solid without them if the surface is wrapped before (`medial repair --wrap`)";
 
 /// Number of spheres that share the deepest place found so far.
 const REACH_CHUNK: usize = 4_096;
@@ -505,7 +502,7 @@ impl Shape {
     }
 
     /// What a user has to know of the surface and the start of a result: changes to the solid, warnings of its report,
-    /// [`Shape::sampling_warning`], and spheres that reach far beyond the surface. Of substrates that were not built nothing
+    /// [`Shape::sampling_warning`], and spheres that close gaps or reach far beyond the surface. Of substrates that were not built nothing
     /// is said. Cost: a bounded search in the tree of the surface for each sphere of the start.
     pub fn remarks(&self) -> Vec<String> {
         let report = self.report();
@@ -517,10 +514,11 @@ impl Shape {
         let triangulated =
             self.store.of_samples.delaunay.get().and_then(|(found, _)| found.as_ref().ok());
         if triangulated.is_some_and(|found| found.closes_gaps) {
-            remarks.push(format!(
+            remarks.push(
                 "spheres of the initial medial mesh close gaps of the solid that are narrower than 0.03 % of the diagonal; \
-                 {WRAP}"
-            ));
+                 wrap the surface (`medial repair --wrap`), which closes them in the solid, too"
+                    .to_owned(),
+            );
         }
         let reach = self.reach().filter(|&reach| reach > FAR_START);
         remarks.extend(reach.map(|reach| {
@@ -543,7 +541,7 @@ impl Shape {
     pub fn reach(&self) -> Option<f64> {
         let Sampling::Conforming { .. } = self.options().sampling else { return None };
         let (start, _) = self.store.of_samples.medial.get()?;
-        let (start, tree) = (start.as_ref().ok()?, self.surface_tree().ok()?);
+        let ([_, start], tree) = (start.as_ref().ok()?, self.surface_tree().ok()?);
         let deepest = |spheres: &[Sphere]| {
             spheres.iter().fold(0.0, |reach: f64, sphere| {
                 let nearest = tree.closest_within_from(sphere.centre, sphere.radius - reach, None);
@@ -559,7 +557,7 @@ impl Shape {
     fn bareness(&self) -> Option<f64> {
         let Sampling::Conforming { .. } = self.options().sampling else { return None };
         let OfSamples { medial, delaunay, cells, .. } = &self.store.of_samples;
-        let start = medial.get()?.0.as_ref().ok()?;
+        let [_, start] = medial.get()?.0.as_ref().ok()?;
         let delaunay = &delaunay.get()?.0.as_ref().ok()?.delaunay;
         let is_touched = cells.get()?.0.as_ref().ok()?.touched(delaunay);
         let points = || (0..).zip(&is_touched).map(|(v, &is)| (delaunay.point(VertexId(v)), is));
@@ -649,16 +647,25 @@ impl Shape {
     /// # Errors
     /// When the samples do not span space, or no circumcentre lies inside the surface.
     pub fn voronoi(&self) -> Result<Arc<MedialMesh>, ShapeError> {
+        self.medial().map(|[voronoi, _]| voronoi)
+    }
+
+    /// The Voronoi medial mesh; and that with split edges, where the samples are the conforming ones.
+    fn medial(&self) -> Result<[Arc<MedialMesh>; 2], ShapeError> {
         let delaunay = self.delaunay()?;
         let cells = self.cells()?;
         let facets = self.facets()?;
+        let inside = matches!(self.options().sampling, Sampling::Conforming { .. })
+            .then(|| self.inside_test());
         self.built(Substrate::MedialMesh, &self.store.of_samples.medial, || {
             let (samples, dual) = (self.samples(), self.store.options.dual);
             let mesh = voronoi_medial_mesh(&delaunay, &cells, &facets, &samples, dual);
             if mesh.spheres.is_empty() {
                 return Err(ShapeError::of_nothing_inside(&cells));
             }
-            Ok(Arc::new(mesh))
+            let split = inside.and_then(|inside| without_bulges(&mesh, &inside)).map(Arc::new);
+            let mesh = Arc::new(mesh);
+            Ok([Arc::clone(&mesh), split.unwrap_or(mesh)])
         })
     }
 
@@ -684,19 +691,15 @@ impl Shape {
     }
 
     /// The medial mesh that every simplifier of this shape starts from, in normalised units: the
-    /// given one, or the Voronoi medial mesh, with spheres on the edges that reach far beyond the surface.
+    /// given one, or the Voronoi medial mesh, on conforming samples with spheres on the edges that reach far beyond the
+    /// surface.
     ///
     /// # Errors
     /// As [`Shape::voronoi`]; when the given mesh has no sphere or is not valid.
     pub fn initial(&self) -> Result<Arc<MedialMesh>, ShapeError> {
         match &self.given {
             Some(given) => given.clone(),
-            None => {
-                let (voronoi, inside) = (self.voronoi()?, self.inside_test());
-                self.built(Substrate::MedialMesh, &self.store.of_samples.initial, || {
-                    Ok(without_bulges(&voronoi, &inside).map_or(voronoi, Arc::new))
-                })
-            }
+            None => self.medial().map(|[_, initial]| initial),
         }
     }
 

@@ -458,15 +458,22 @@ pub(super) fn halve_shared_edges(vertices: &mut Vec<Vec3>, faces: &mut Vec<[u32;
             *count.entry([a.min(b), a.max(b)]).or_default() += 1;
         }
     }
-    for [a, b] in count.into_iter().filter(|&(_, faces)| faces > 2).map(|(edge, _)| edge) {
-        let middle = vertices.len() as u32;
-        vertices.push(vertices[a as usize].midpoint(vertices[b as usize]));
-        for face in 0..faces.len() {
-            let corners = faces[face];
-            if corners.contains(&a) && corners.contains(&b) {
-                faces[face] = corners.map(|v| if v == a { middle } else { v });
-                faces.push(corners.map(|v| if v == b { middle } else { v }));
-            }
+    count.retain(|_, faces| *faces > 2);
+    for ([a, b], middle) in &mut count {
+        *middle = vertices.len();
+        vertices.push(vertices[*a as usize].midpoint(vertices[*b as usize]));
+    }
+    let mut waiting = std::mem::take(faces);
+    waiting.reverse();
+    while let Some(face) = waiting.pop() {
+        let [a, b, c] = face;
+        let halved = [[a, b], [b, c], [c, a]].into_iter().find_map(|[a, b]| {
+            let middle = *count.get(&[a.min(b), a.max(b)])? as u32;
+            Some([a, b].map(|end| face.map(|v| if v == end { middle } else { v })))
+        });
+        match halved {
+            Some(halves) => waiting.extend(halves),
+            None => faces.push(face),
         }
     }
 }
