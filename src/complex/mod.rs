@@ -13,6 +13,7 @@ pub mod union_axis;
 mod voronoi;
 
 pub(crate) use bulges::without_bulges;
+pub(crate) use conforming::is_coarse;
 pub use conforming::{Conforming, ConformingError};
 pub use contour::{ContourError, UnionSurface, union_surface, union_surface_within};
 pub use formats::{

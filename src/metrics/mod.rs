@@ -41,6 +41,7 @@ pub use evaluation::{
 pub use judge::{Judge, JudgeOptions, Truth};
 pub use peaks::{DistanceOptions, PeakSearch, Peaks};
 pub use quality::{counts, triangle_quality};
+pub(crate) use samples::place_on_triangles;
 pub use spikes::{FIN_ANGLE, IDLE_PROTRUSION, RATIO_THRESHOLDS, SPIKE_ANGLE, spikes};
 pub use structure::{CONTACT, REACHED, SHARP_ANGLE, StructureSurface};
 pub use union_topology::{topology_warning, union_betti};

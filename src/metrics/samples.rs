@@ -80,7 +80,7 @@ const STREAM: u64 = 0x6d65_6173_7572_6521;
 ///
 /// Stratified, unlike the independent points of [`crate::surface::Sampling::AreaUniform`]: means
 /// have less variance, and small parts are not missed by chance.
-pub(super) fn place_on_triangles(
+pub(crate) fn place_on_triangles(
     triangles: &[[Vec3; 3]],
     count: usize,
     seed: u64,

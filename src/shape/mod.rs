@@ -6,6 +6,7 @@
 //! mesh. [`Shape::view`] opens a fresh view on the same store.
 
 mod balls;
+mod closeness;
 mod similarity;
 
 use std::collections::BTreeMap;
@@ -13,21 +14,19 @@ use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
 use crate::complex::{
     CellSpheres, ComplexError, Conforming, ConformingError, DualTriangulation, MedialMesh,
-    MedialUnion, Sphere, VoronoiFacets, voronoi_medial_mesh, without_bulges,
+    VoronoiFacets, voronoi_medial_mesh, without_bulges,
 };
 use crate::diagnostics::Diagnostics;
 use crate::geometry::{Delaunay, TriangulationError, VertexId};
 use crate::heap::{Usage, usage_apart, usage_of};
 use crate::metrics::{Judge, JudgeOptions, Truth};
 use crate::surface::{
-    BvhError, InsideTest, Normalisation, PointGrid, Sampling, SurfaceReport, TriMesh, TriangleBvh,
-    sample,
+    BvhError, InsideTest, Normalisation, Sampling, SurfaceReport, TriMesh, TriangleBvh, sample,
 };
 
 pub use balls::{ContactSets, InnerBalls, PolarBalls};
@@ -104,8 +103,6 @@ struct Triangulated {
     is_inside: Result<Vec<bool>, Option<String>>,
     /// Doubt about the topology of the cells inside.
     doubt: Option<String>,
-    /// Whether balls close a part of the surface in gaps.
-    closes_gaps: bool,
 }
 
 impl Triangulated {
@@ -122,20 +119,14 @@ impl Triangulated {
             _ => Err(ConformingError::Crossing),
         };
         match found {
-            Ok(Conforming { delaunay, is_inside, missing, narrow_gaps, .. }) => {
+            Ok(Conforming { delaunay, is_inside, missing, .. }) => {
                 let doubt = (missing > 0).then(|| {
                     format!(
                         "the initial medial mesh may have another topology than the solid: parts of the surface are too \
                          close to each other for samples ({missing} faces); {ADVICE}"
                     )
                 });
-                let closes_gaps = narrow_gaps > FAR_START * FAR_START;
-                Ok(Self {
-                    delaunay: Arc::new(delaunay),
-                    is_inside: Ok(is_inside),
-                    doubt,
-                    closes_gaps,
-                })
+                Ok(Self { delaunay: Arc::new(delaunay), is_inside: Ok(is_inside), doubt })
             }
             Err(ConformingError::Triangulation(error)) => Err(error),
             Err(why) => {
@@ -150,22 +141,16 @@ impl Triangulated {
 
     fn plain(samples: &[Vec3]) -> Result<Self, TriangulationError> {
         let delaunay = Arc::new(Delaunay::new(samples)?);
-        Ok(Self { delaunay, is_inside: Err(None), doubt: None, closes_gaps: false })
+        Ok(Self { delaunay, is_inside: Err(None), doubt: None })
     }
 }
 
 /// Points that may be added to a coarse surface; to others eight for each vertex.
 const LEAST_BUDGET: usize = 20_000;
 
-/// Reach of a start beyond the surface, as a fraction of the diagonal, that users are warned of.
-const FAR_START: f64 = 0.02;
-
 /// What helps where parts of a surface are too close to each other.
 const ADVICE: &str = "give more samples (`--sampling conforming:N`), or wrap the surface (`medial repair --wrap`), which \
                       closes gaps narrower than 2 % of the diagonal";
-
-/// Number of spheres that share the deepest place found so far.
-const REACH_CHUNK: usize = 4_096;
 
 /// The part that does not depend on the samples.
 #[derive(Default)]
@@ -502,8 +487,9 @@ impl Shape {
     }
 
     /// What a user has to know of the surface and the start of a result: changes to the solid, warnings of its report,
-    /// [`Shape::sampling_warning`], and spheres that close gaps or reach far beyond the surface. Of substrates that were not built nothing
-    /// is said. Cost: a bounded search in the tree of the surface for each sphere of the start.
+    /// [`Shape::sampling_warning`], and places where the start is far from the surface. Of substrates that were not built
+    /// nothing is said. Cost: a bounded search in the tree of the surface for each sphere of the start; on coarse surfaces also
+    /// the tree of the start.
     pub fn remarks(&self) -> Vec<String> {
         let report = self.report();
         let changes = report.repairs.iter().filter(|repair| repair.changes_solid());
@@ -511,66 +497,8 @@ impl Shape {
             changes.map(|repair| format!("repaired: {repair}")).collect();
         remarks.extend(report.warnings.iter().cloned());
         remarks.extend(self.sampling_warning());
-        let triangulated =
-            self.store.of_samples.delaunay.get().and_then(|(found, _)| found.as_ref().ok());
-        if triangulated.is_some_and(|found| found.closes_gaps) {
-            remarks.push(
-                "spheres of the initial medial mesh close gaps of the solid that are narrower than 0.03 % of the diagonal; \
-                 wrap the surface (`medial repair --wrap`), which closes them in the solid, too"
-                    .to_owned(),
-            );
-        }
-        let reach = self.reach().filter(|&reach| reach > FAR_START);
-        remarks.extend(reach.map(|reach| {
-            let percent = 100.0 * reach;
-            format!(
-                "spheres of the initial medial mesh reach {percent:.1} % of the diagonal beyond the surface; {ADVICE}"
-            )
-        }));
-        remarks.extend(self.bareness().map(|distance| {
-            let percent = 100.0 * distance;
-            format!(
-                "parts of the surface are up to {percent:.1} % of the diagonal away from the initial medial mesh; {ADVICE}"
-            )
-        }));
+        remarks.extend(self.far_places());
         remarks
-    }
-
-    /// Largest distance by which a sphere of the conforming medial mesh reaches beyond the surface, as a fraction of the
-    /// diagonal; `None` before that is built.
-    pub fn reach(&self) -> Option<f64> {
-        let Sampling::Conforming { .. } = self.options().sampling else { return None };
-        let (start, _) = self.store.of_samples.medial.get()?;
-        let ([_, start], tree) = (start.as_ref().ok()?, self.surface_tree().ok()?);
-        let deepest = |spheres: &[Sphere]| {
-            spheres.iter().fold(0.0, |reach: f64, sphere| {
-                let nearest = tree.closest_within_from(sphere.centre, sphere.radius - reach, None);
-                nearest.map_or(reach, |nearest| reach.max(sphere.radius - nearest.distance))
-            })
-        };
-        let parts = start.spheres.par_chunks(REACH_CHUNK).map(deepest);
-        Some(parts.reduce(|| 0.0, f64::max))
-    }
-
-    /// Largest distance of a sample from the conforming medial mesh, as a fraction of the diagonal, if it is above
-    /// [`FAR_START`].
-    fn bareness(&self) -> Option<f64> {
-        let Sampling::Conforming { .. } = self.options().sampling else { return None };
-        let OfSamples { medial, delaunay, cells, .. } = &self.store.of_samples;
-        let [_, start] = medial.get()?.0.as_ref().ok()?;
-        let delaunay = &delaunay.get()?.0.as_ref().ok()?.delaunay;
-        let is_touched = cells.get()?.0.as_ref().ok()?.touched(delaunay);
-        let points = || (0..).zip(&is_touched).map(|(v, &is)| (delaunay.point(VertexId(v)), is));
-        let mut near = PointGrid::new(FAR_START);
-        points().filter(|&(_, is_touched)| is_touched).for_each(|(p, _)| near.insert(p));
-        let bare = points().filter(|&(p, is)| !is && !near.any_within(p, FAR_START));
-        let bare: Vec<Vec3> = bare.map(|(p, _)| p).collect();
-        if bare.is_empty() {
-            return None;
-        }
-        let union = MedialUnion::new(start).ok()?;
-        let farthest = union.signed_batch(&bare).into_iter().fold(0.0, f64::max);
-        (farthest > FAR_START).then_some(farthest)
     }
 
     fn triangulated(&self) -> Result<Arc<Triangulated>, ShapeError> {

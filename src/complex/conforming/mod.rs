@@ -123,9 +123,6 @@ pub struct Conforming {
     pub rounds: usize,
     /// Number of faces that the triangulation does not contain: then the topology of its cells may differ from the solid's.
     pub missing: usize,
-    /// Area of the surface at gaps narrower than 3e-4 of the diagonal, as a share of the squared diagonal: balls on both sides
-    /// close them. Zero on dense surfaces, which are not searched.
-    pub narrow_gaps: f64,
 }
 
 /// Why a surface has no such triangulation.
@@ -196,22 +193,20 @@ impl Conforming {
             }
         }
         let mut refinement = kept.ok_or(failure)?;
-        let mut narrow_gaps = 0.0;
         if (is_coarse || refinement.has_protrusions(FAR))
             && let Ok(tree) = TriangleBvh::new(surface)
         {
             refinement.approach(&tree, false);
             if is_coarse {
                 refinement.approach(&tree, true);
-                narrow_gaps = refinement.narrow_gaps(&tree);
             }
         }
-        Ok(Self { narrow_gaps, ..refinement.finish() })
+        Ok(refinement.finish())
     }
 }
 
 /// Whether the surface has an edge longer than [`COARSE`].
-fn is_coarse(surface: &TriMesh) -> bool {
+pub(crate) fn is_coarse(surface: &TriMesh) -> bool {
     let Some(units) = Normalisation::of(surface) else { return false };
     let limit = COARSE * units.diagonal;
     let triangles = (0..surface.faces.len()).map(|f| surface.triangle(f));
@@ -285,7 +280,7 @@ impl Refinement {
             specks::mend_loops(&delaunay, &mut is_inside, &skin, &missing, betti);
         }
         let added = skin.points.len() - vertices;
-        Conforming { delaunay, is_inside, added, rounds, missing: missing.len(), narrow_gaps: 0.0 }
+        Conforming { delaunay, is_inside, added, rounds, missing: missing.len() }
     }
 
     /// Step 6: adds points until all balls end near the surface or the limit is reached; on coarse surfaces also until they

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
+use super::Refinement;
 use super::skin::{Place, Skin, key, sides};
-use super::{CLOSE, Refinement};
 use crate::Vec3;
 use crate::complex::Sphere;
 use crate::geometry::CellId;
@@ -162,27 +162,6 @@ impl Refinement {
         // A surface sideways of the tip, as behind an edge, bounds no gap.
         nearest.distance < 0.9 * way
             && outward.dot(nearest.point - tip).abs() > 0.5 * nearest.distance
-    }
-
-    /// Area of the surface at gaps that are too narrow for [`Self::closing_gaps`], as a share of the squared diagonal.
-    pub fn narrow_gaps(&self, surface: &TriangleBvh) -> f64 {
-        let Self { skin, .. } = self;
-        let depth = LEAST * CLOSE * skin.diagonal;
-        let areas = (0..skin.triangles.len() as u32).into_par_iter().filter_map(|triangle| {
-            let [a, b, c] = skin.corners(triangle);
-            let foot = (a + b + c) / 3.0;
-            let area = 0.5 * (b - a).cross(c - a).length();
-            // A tip far beyond the other side does not see it.
-            let mut depths = [1.0, 0.2, 0.04].into_iter().map(|share| share * depth);
-            let is_narrow = depths.any(|depth| {
-                let tip = Protrusion { depth, centre: foot, radius: depth, foot, triangle };
-                self.closes_gap(&tip, surface)
-            });
-            is_narrow.then_some(area)
-        });
-        // The order of a sum in parallel depends on the number of threads.
-        let areas: Vec<f64> = areas.collect();
-        areas.into_iter().sum::<f64>() / skin.diagonal.powi(2)
     }
 
     /// For each ball inside the deepest place where it closes a gap, and is deeper than `least`. The nearest part of the
