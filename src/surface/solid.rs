@@ -83,23 +83,24 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
             return None;
         }
         tried.push(vertices);
-        let by = |way| resolved(built.clone(), weld.clone(), unit, checked, way);
-        // Welded along common edges, bodies hang together where rounding has turned their faces around each other.
-        let unwelded = || {
-            let bodies = in_runs(&built)?;
+        // Welded along common edges, bodies hang together in another way where one is inside out, or where rounding has turned
+        // their faces around each other.
+        let bodies = in_runs(&built).and_then(|bodies| {
             let own: Vec<u32> = (0..bodies.vertices.len() as u32).collect();
             let bodies = build(&bodies, unit, &own, Duplicates::Kept).ok()?;
             bodies.topology.is_manifold().then_some(bodies)
-        };
-        let of_bodies = |way| resolved(unwelded()?, None, unit, checked, way);
+        });
+        let by = |way| resolved(built.clone(), weld.clone(), unit, checked, way);
+        let of_bodies = |way| resolved(bodies.clone()?, None, unit, checked, way);
         let [usual, other] = [Order::SmallerIntoLarger, Order::LargerIntoSmaller].map(Way::Pushed);
         let ways: [&dyn Fn() -> Option<Loaded>; 4] = [
+            &|| of_bodies(usual).or_else(|| of_bodies(Way::Walls)),
             &|| by(usual).or_else(|| by(Way::Walls)),
-            &|| of_bodies(usual),
-            &|| by(other),
             &|| of_bodies(other),
+            &|| by(other),
         ];
-        by(Way::WallsAlone).or_else(|| simplest(ways.into_iter().filter_map(|way| way())))
+        let walls_alone = by(Way::WallsAlone).or_else(|| of_bodies(Way::WallsAlone));
+        walls_alone.or_else(|| simplest(ways.into_iter().filter_map(|way| way())))
     })
 }
 
@@ -174,16 +175,13 @@ fn resolved(
 ) -> Option<Loaded> {
     let diagonal = checked.report.diagonal;
     let mut repairs = checked.report.repairs.clone();
-    let drop_walls = |vertices: &mut Vec<Vec3>, faces: &mut Vec<[u32; 3]>| match way {
-        Way::Pushed(_) => None,
-        Way::WallsAlone | Way::Walls => drop_walls(vertices, faces),
-    };
-    let walls = drop_walls(&mut built.vertices, &mut built.faces);
     built.points = unit.forward_all(&built.vertices);
+    // A body that crosses a wall lies in neither of its sides: walls are left out after the turns.
     let (mut mesh, turns) = oriented(built)?;
-    // Bodies that were inside out have walls of opposite orientation now.
-    let further = drop_walls(&mut mesh.vertices, &mut mesh.faces);
-    let walls = joined(walls, further);
+    let walls = match way {
+        Way::Pushed(_) => None,
+        Way::WallsAlone | Way::Walls => drop_walls(&mut mesh.vertices, &mut mesh.faces),
+    };
     // The check dropped walls, and turned faces that it joined in another way.
     repairs.retain(|repair| {
         use Repair::{DroppedDuplicateFaces, ReorientedFaces, TurnedInward, TurnedOutward};
@@ -499,28 +497,21 @@ fn drop_walls(vertices: &mut Vec<Vec3>, faces: &mut Vec<[u32; 3]>) -> Option<Rep
     Some(Repair::DroppedWalls { faces: dropped, distance })
 }
 
-/// Walls that were left out in two steps.
-fn joined(first: Option<Repair>, second: Option<Repair>) -> Option<Repair> {
-    match (first, second) {
-        (
-            Some(Repair::DroppedWalls { faces, distance }),
-            Some(Repair::DroppedWalls { faces: more, distance: other }),
-        ) => Some(Repair::DroppedWalls { faces: faces + more, distance: distance.max(other) }),
-        (first, second) => first.or(second),
-    }
-}
-
 /// Faces oriented like their neighbours, and bodies outward, or inward where they are cavities; with the repairs. None for
 /// one-sided surfaces, which have no winding number.
 fn oriented(built: Repaired) -> Option<(TriMesh, Vec<Repair>)> {
     let Repaired { mut vertices, mut faces, unit, points, .. } = built;
-    let mut repeated = 0;
-    let Parted { faces: apart, vertices: of, turned } = parted(&points, &faces).or_else(|| {
-        let all = faces.len();
-        drop_repeated(&mut faces);
-        repeated = all - faces.len();
-        (repeated > 0).then(|| parted(&points, &faces)).flatten()
-    })?;
+    let all = faces.len();
+    let single = without_repeated(&faces);
+    let Parted { faces: apart, vertices: of, turned } = match parted(&points, &single) {
+        Some(found) => {
+            faces = single;
+            found
+        }
+        // A face of two bodies.
+        None => parted(&points, &faces)?,
+    };
+    let repeated = all - faces.len();
     let points: Vec<Vec3> = of.iter().map(|&v| points[v as usize]).collect();
     let topology = Topology::new(points.len(), &apart);
     let found = intersections(&points, &apart, &topology.component);
@@ -548,15 +539,16 @@ fn oriented(built: Repaired) -> Option<(TriMesh, Vec<Repair>)> {
     Some((TriMesh { vertices, faces }, repairs))
 }
 
-/// Drops faces with the corners and the orientation of an earlier one.
-fn drop_repeated(faces: &mut Vec<[u32; 3]>) {
+/// Faces without those that have the corners and the orientation of an earlier one.
+fn without_repeated(faces: &[[u32; 3]]) -> Vec<[u32; 3]> {
     let mut seen = HashSet::new();
-    faces.retain(|face| {
-        let mut key = *face;
+    let is_new = |face: &&[u32; 3]| {
+        let mut key = **face;
         let least = (0..3).min_by_key(|&k| face[k]).unwrap_or_default();
         key.rotate_left(least);
         seen.insert(key)
-    });
+    };
+    faces.iter().filter(is_new).copied().collect()
 }
 
 /// The boundary of the region with a winding number of at least 1: with few vertices in plane parts, where faces may overlap,

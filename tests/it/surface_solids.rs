@@ -313,6 +313,52 @@ fn overlaps_that_meet_the_bodies_along_edges_alone_are_solid() {
 }
 
 #[test]
+fn bodies_across_a_wall_are_parts() {
+    let block = |low: [f64; 3], high: [f64; 3]| cuboid(low.into(), high.into());
+    let left = || block([0.0, 0.0, 0.0], [2.0, 2.0, 2.0]);
+    let right = || block([2.0, 0.0, 0.0], [4.0, 2.0, 2.0]);
+    // Inside, with a common plane, and out at one end.
+    for (low, length, volume) in [(0.5, 3.0, 16.0), (0.5, 3.5, 16.0), (0.5, 4.0, 16.5)] {
+        let pin = block([low, 0.5, 0.5], [low + length, 1.5, 1.5]);
+        for turned in [pin.clone(), inverted(pin)] {
+            let report = read(&joined(&[left(), right(), turned])).report;
+            assert_eq!((report.volume, report.expected_betti), (Some(volume), Some([1, 0, 0])));
+        }
+    }
+}
+
+#[test]
+fn inverted_bodies_with_common_edges_are_parts() {
+    let hexagon = |offset: f64| {
+        let at = |k: usize, z: f64| {
+            let angle = (k % 6) as f64 * TAU / 6.0;
+            Vec3::new(offset + angle.cos(), angle.sin(), z)
+                .to_array()
+                .map(|x| (1e6 * x).round() / 1e6)
+        };
+        let ring = |z: f64| (0..6).map(move |k| Vec3::from(at(k, z)));
+        let vertices = ring(0.0).chain(ring(1.0)).collect();
+        let side = |k: u32| {
+            let next = (k + 1) % 6;
+            [[k, next, next + 6], [k, next + 6, k + 6]]
+        };
+        let caps = (1..5).flat_map(|k| [[0, k + 1, k], [6, k + 6, k + 7]]);
+        TriMesh { vertices, faces: (0..6).flat_map(side).chain(caps).collect() }
+    };
+    let [first, second] = [0.0, 1.0].map(hexagon);
+    let all = [
+        [first.clone(), second.clone()],
+        [inverted(first.clone()), second.clone()],
+        [first.clone(), inverted(second.clone())],
+        [inverted(first), inverted(second)],
+    ];
+    for (k, bodies) in all.iter().enumerate() {
+        let volume = read(&joined(bodies)).report.volume.expect("closed");
+        assert!((volume - 4.330125).abs() < 1e-4, "case {k}: {volume}");
+    }
+}
+
+#[test]
 fn walls_cut_in_two_ways_and_rounded_are_no_gaps() {
     let mut random = Pcg64::seed_from_u64(3);
     for case in 0..40 {
