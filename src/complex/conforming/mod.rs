@@ -67,8 +67,8 @@ const ROUNDS: usize = 1_000;
 /// Ratio of the number of points to that with the fewest missing triangles, above which patches are given up.
 const GROWTH: usize = 2;
 
-/// Points in addition to these after which patches are given up.
-const SLACK: usize = 20_000;
+/// Points in addition to these after which patches are given up: of a surface, and of a round against far balls.
+const SLACK: [usize; 2] = [20_000, 6_000];
 
 /// Limit of rounds against balls that reach far beyond the surface. Few shapes need ten.
 const APPROACHES: usize = 40;
@@ -341,6 +341,7 @@ impl Refinement {
         // The state with the fewest missing triangles.
         let mut best: Option<Box<Snapshot>> = None;
         let (mut least, mut limit, mut since) = (usize::MAX, 0, self.rounds);
+        let slack = SLACK[usize::from(surface.is_some())];
         let Way { bends, give_ups, rounds, .. } = self.way;
         loop {
             let mut stars = Stars::of(&self.delaunay);
@@ -365,7 +366,7 @@ impl Refinement {
                 return Ok(());
             }
             if open.len() < least {
-                (least, limit) = (open.len(), GROWTH * skin.points.len() + SLACK);
+                (least, limit) = (open.len(), GROWTH * skin.points.len() + slack);
                 since = self.rounds;
                 let (skin, delaunay) = (skin.clone(), self.delaunay.clone());
                 best = Some(Box::new(Snapshot { skin, delaunay, missing: missing.clone() }));

@@ -4,12 +4,12 @@ use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use super::skin::{Skin, key};
-use super::stars::star;
+use super::stars::{star, star_while};
 use crate::geometry::triangulation::Facet;
 use crate::geometry::{CellId, Delaunay, DisjointSets, VertexId};
 
-/// Limit of the cells that are visited in searches for a way around a cell.
-const VISITS: usize = 20_000_000;
+/// Limit of the cells that are visited in searches around a cell and its vertices.
+const VISITS: usize = 100_000_000;
 
 /// Joins the parts and cavities beyond the numbers of the solid with their surroundings, those of least volume: missing
 /// triangles and degenerate places leave such.
@@ -108,69 +108,82 @@ struct Mending<'m> {
 impl Mending<'_> {
     /// Moves some of the cells until the Euler characteristic is right, or no cell brings it closer.
     fn mend_all(&mut self, cells: &[CellId]) {
-        while self.excess != 0 && (self.mend(cells) || self.mend_beyond(cells)) {}
-    }
-
-    /// Moves the first of some cells that bring the Euler characteristic closer to the solid's and leave as many regions.
-    /// Whether there is one.
-    fn mend(&mut self, cells: &[CellId]) -> bool {
-        for &cell in cells {
-            let effect = self.effect(cell);
-            if (self.excess + effect).abs() < self.excess.abs()
-                && [true, false].into_iter().all(|side| self.is_connected(cell, side, |_| true))
-            {
-                self.is_inside[cell.index()] ^= true;
-                self.excess += effect;
-                return true;
+        loop {
+            let before = self.excess;
+            for &cell in cells {
+                self.mend(cell);
+            }
+            if self.excess == before && !self.mend_beyond(cells) {
+                return;
             }
         }
-        false
     }
 
-    /// Moves cells that change no homotopy type until one next to them can be mended, and those back that were not needed.
+    /// Moves a cell that brings the Euler characteristic closer to the solid's and leaves as many regions. Whether it does.
+    fn mend(&mut self, cell: CellId) -> bool {
+        if self.excess == 0 || self.visits == 0 {
+            return false;
+        }
+        let effect = self.effect(cell);
+        let is_closer = (self.excess + effect).abs() < self.excess.abs()
+            && [true, false].into_iter().all(|side| self.is_connected(cell, side, |_| true));
+        if is_closer {
+            self.is_inside[cell.index()] ^= true;
+            self.excess += effect;
+        }
+        is_closer
+    }
+
+    /// Moves cells that change no homotopy type, and mends cells next to them; then those back that were not needed. Whether any
+    /// was mended.
     fn mend_beyond(&mut self, cells: &[CellId]) -> bool {
-        let delaunay = self.delaunay;
         let rank: HashMap<CellId, usize> = cells.iter().copied().zip(0..).collect();
-        let near = |cell: CellId| {
-            let around = delaunay.vertices(cell).into_iter().flat_map(|v| star(delaunay, v.0));
-            let ranks: BTreeSet<usize> = around.filter_map(|c| rank.get(&c).copied()).collect();
-            ranks.into_iter().map(|rank| cells[rank]).collect::<Vec<CellId>>()
-        };
+        let before = self.excess;
         for side in [true, false] {
             let mut moved = Vec::new();
-            let mut is_mended = false;
-            'rounds: loop {
-                let before = moved.len();
+            let mut first = usize::MAX;
+            while first != moved.len() && self.excess != 0 && self.visits > 0 {
+                first = moved.len();
                 for &cell in cells {
                     if self.is_inside[cell.index()] == side && self.is_simple(cell) {
                         self.is_inside[cell.index()] ^= true;
                         moved.push(cell);
-                        is_mended = self.mend(&near(cell));
-                        if is_mended {
-                            break 'rounds;
+                        for near in self.near(cell, &rank) {
+                            self.mend(cells[near]);
                         }
                     }
                 }
-                if moved.len() == before {
-                    break;
-                }
             }
             for &cell in moved.iter().rev() {
+                let is_mended = self.excess != before;
                 if !is_mended || self.is_inside[cell.index()] != side && self.is_simple(cell) {
                     self.is_inside[cell.index()] = side;
                 }
             }
-            if is_mended {
+            if self.excess != before {
                 return true;
             }
         }
         false
     }
 
+    /// Ranks of the ranked cells at the corners of a cell.
+    fn near(&mut self, cell: CellId, rank: &HashMap<CellId, usize>) -> BTreeSet<usize> {
+        let mut ranks = BTreeSet::new();
+        for v in self.delaunay.vertices(cell) {
+            let around = star(self.delaunay, v.0);
+            self.visits = self.visits.saturating_sub(around.len());
+            ranks.extend(around.iter().filter_map(|c| rank.get(c).copied()));
+        }
+        ranks
+    }
+
     /// What moving a cell to the other side adds to the Euler characteristic.
-    fn effect(&self, cell: CellId) -> i64 {
+    fn effect(&mut self, cell: CellId) -> i64 {
         let sign = if self.is_inside[cell.index()] { -1 } else { 1 };
-        sign * effect(self.delaunay, self.is_inside, cell)
+        let (effect, visits) = effect(self.delaunay, self.is_inside, cell);
+        self.visits = self.visits.saturating_sub(visits);
+        sign * effect
     }
 
     /// Whether moving a cell to the other side changes no homotopy type: the neighbours of each side are connected around it.
@@ -271,23 +284,28 @@ fn euler(delaunay: &Delaunay, is_inside: &[bool]) -> i64 {
     let mut added = vec![false; is_inside.len()];
     let mut sum = 0;
     for cell in delaunay.finite_cells().filter(|cell| is_inside[cell.index()]) {
-        sum += effect(delaunay, &added, cell);
+        sum += effect(delaunay, &added, cell).0;
         added[cell.index()] = true;
     }
     sum
 }
 
 /// The change of the Euler characteristic when a cell is added to those inside: its dual vertex, with the dual edge of each
-/// facet, the dual polygon of each edge, and the dual polyhedron of each vertex that are complete then.
-fn effect(delaunay: &Delaunay, is_inside: &[bool], cell: CellId) -> i64 {
+/// facet, the dual polygon of each edge, and the dual polyhedron of each vertex that are complete then. With the number of
+/// cells that were visited around its vertices.
+fn effect(delaunay: &Delaunay, is_inside: &[bool], cell: CellId) -> (i64, usize) {
     let is_in = |other: &CellId| *other == cell || inside(is_inside, *other);
     let facets = delaunay.neighbours(cell).iter().filter(|other| is_in(other)).count();
     let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
     let edges =
         pairs.iter().filter(|&&(i, j)| delaunay.edge_ring(cell, i, j).all(|c| is_in(&c))).count();
-    let vertices = delaunay.vertices(cell);
-    let vertices = vertices.iter().filter(|v| star(delaunay, v.0).iter().all(is_in)).count();
-    1 - facets as i64 + edges as i64 - vertices as i64
+    let (mut vertices, mut visits) = (0, 0);
+    for v in delaunay.vertices(cell) {
+        let around = star_while(delaunay, v.0, |other| is_in(&other));
+        visits += around.len();
+        vertices += i64::from(around.last().is_some_and(is_in));
+    }
+    (1 - facets as i64 + edges as i64 - vertices, visits)
 }
 
 fn volume(delaunay: &Delaunay, cell: CellId) -> f64 {

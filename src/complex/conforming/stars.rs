@@ -12,6 +12,15 @@ const LARGE: usize = 64;
 
 /// The cells around a vertex, infinite ones included, in the order of a search from its first.
 pub(super) fn star(triangulation: &Triangulation, vertex: u32) -> Vec<CellId> {
+    star_while(triangulation, vertex, |_| true)
+}
+
+/// The same up to the first cell that fails a test, with that cell.
+pub(super) fn star_while(
+    triangulation: &Triangulation,
+    vertex: u32,
+    test: impl Fn(CellId) -> bool,
+) -> Vec<CellId> {
     let vertex = VertexId(vertex);
     let mut star: Vec<CellId> = triangulation.incident_cell(vertex).into_iter().collect();
     // Most stars are small, and a list is the fastest set.
@@ -20,6 +29,10 @@ pub(super) fn star(triangulation: &Triangulation, vertex: u32) -> Vec<CellId> {
     while next < star.len() {
         let cell = star[next];
         next += 1;
+        if !test(cell) {
+            star.truncate(next);
+            break;
+        }
         let (v, n) = (triangulation.vertices(cell), triangulation.neighbours(cell));
         for k in 0..4 {
             // Beyond every facet that has the vertex.
