@@ -1,6 +1,5 @@
 //! Medial meshes that a user names, and outputs that are checked before the work for them is done.
 
-use std::fs::File;
 use std::path::Path;
 
 use medial::complex::{self, MedialMesh, WRITABLE, single_precision_loss};
@@ -25,12 +24,6 @@ pub fn shape_of(
     let input = Input::load(&source)?;
     let shape = input.shape(options).map_err(|error| Failure::at(mesh, error))?;
     Ok((input, shape))
-}
-
-/// Opens a file of a user for reading. Fails when it cannot be opened, or is a pipe or device, which may never end.
-pub fn open_regular(path: &Path) -> Result<File, Failure> {
-    let file = medial::check_regular(path).and_then(|()| File::open(path));
-    file.map_err(|error| Failure::at(path, error))
 }
 
 /// A note on the part of a medial mesh that the file `path` cannot hold.

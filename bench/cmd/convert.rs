@@ -13,7 +13,7 @@ use serde_json::json;
 
 use crate::args::{Global, MeshArgument};
 use crate::exit::{Exit, Failure};
-use crate::files::{SURFACES, check_apart, check_extension, left_out, open_regular, shape_of};
+use crate::files::{SURFACES, check_apart, check_extension, left_out, shape_of};
 use crate::output::{counted, print_result};
 
 #[derive(Debug, Args)]
@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         && !SURFACES.contains(&&*extension(&arguments.to))
     {
         if !["builtin:", "dataset:"].iter().any(|known| from.to_string_lossy().starts_with(known)) {
-            open_regular(from)?;
+            surface::read(from).map_err(Failure::input)?;
         }
         let (from, to) = (from.display(), arguments.to.display());
         let (verb, options) = match ["ma", "vtp", "glb"].contains(&&*extension(&arguments.to)) {

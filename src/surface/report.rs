@@ -423,10 +423,11 @@ impl fmt::Display for Repair {
                 )
             }
             Self::DroppedWalls { distance, .. } => {
-                write!(
-                    f,
-                    "left out {what} of walls between touching bodies, {distance:.1e} apart at most"
-                )
+                write!(f, "left out {what} of walls between touching bodies")?;
+                if distance > 0.0 {
+                    write!(f, ", {distance:.1e} apart at most")?;
+                }
+                Ok(())
             }
             Self::ResolvedFaces { by, .. } => {
                 let new = counted(by, "face");

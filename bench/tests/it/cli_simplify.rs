@@ -48,6 +48,8 @@ fn axis_simplify_evaluate_convert() {
     at.done("convert simple.ply axis.ma");
     assert_eq!(at.text("axis.ma"), at.text("simple.ma"));
     at.refused("convert box.off simple.ma", 2, "compute one by `medial axis ");
+    at.done("convert simple.ma simple.glb");
+    at.refused("convert simple.glb axis.ma", 1, "unknown extension \"glb\"");
 }
 
 #[test]
