@@ -47,8 +47,8 @@ impl Shape {
             (bareness, "parts of the surface are up to", "away from the initial medial mesh"),
             (
                 depth,
-                "spheres of the initial medial mesh fill gaps of the solid to a depth of",
-                "and more",
+                "spheres of the initial medial mesh fill gaps: parts of the surface are",
+                "away from the nearest opening",
             ),
         ];
         let far = sentences.into_iter().filter_map(|(far, what, whence)| {
