@@ -24,7 +24,7 @@ const CHUNK: usize = 4_096;
 /// Samples of the surface from which ways out of the union are sought.
 const SAMPLES: usize = 20_000;
 
-/// Samples of which those near far ones are added.
+/// Number of further samples. Those near a sample that is far are used.
 const DENSE_SAMPLES: usize = 200_000;
 
 /// Number of lengths of such ways, from [`FAR`] down to 2e-5.
@@ -76,8 +76,8 @@ impl Shape {
         let delaunay = &of_samples.delaunay.get()?.0.as_ref().ok()?.delaunay;
         let is_touched = of_samples.cells.get()?.0.as_ref().ok()?.touched(delaunay);
         let points = || (0..).zip(&is_touched).map(|(v, &is)| (delaunay.point(VertexId(v)), is));
-        let mut near = PointGrid::new(FAR);
-        points().filter(|&(_, is_touched)| is_touched).for_each(|(p, _)| near.insert(p));
+        let touched: Vec<Vec3> = points().filter(|&(_, is)| is).map(|(p, _)| p).collect();
+        let near = grid(&touched);
         let bare = points().filter(|&(p, is)| !is && !near.any_within(p, FAR));
         Some(bare.map(|(p, _)| p).collect())
     }

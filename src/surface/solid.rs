@@ -7,8 +7,8 @@
 //! file.
 //!
 //! 1. *Weld*: vertices within the first of [`TOLERANCES`] that closes the surface, or the next one where 2 to 4 fail.
-//! 2. *Orient*: plane walls between bodies are left out, and bodies that touch taken apart (`parts.rs`). Then they are turned
-//!    outward, or inward where they are cavities.
+//! 2. *Orient*: bodies that touch are taken apart (`parts.rs`) and turned outward, or inward where they are cavities. Then
+//!    plane walls between them are left out.
 //! 3. *Push*: where leaving out walls does not give a solid, of bodies that stand on each other to within rounding the
 //!    smaller one goes into the larger (`contacts.rs`), with the walls. Cavities as thin as rounding makes them are left out.
 //!    Where the solid has loops or cavities, it is compared with those of other ways to push.

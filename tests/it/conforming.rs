@@ -224,7 +224,7 @@ fn starts_around_concave_edges_at_any_angle_end_near_them() {
     }
 }
 
-/// A block with a slot of some width. The floor below it is nearer to the balls beside the slot than the slot's walls are.
+/// A block with a slot of some width. The balls beside the slot are nearer to its floor than to its walls.
 fn slotted(width: f64) -> TriMesh {
     let planes = [vec![0.0, 2.0, 2.0 + width, 4.0], vec![0.0, 3.0], vec![0.0, 0.4, 2.0]];
     shapes::cells(&planes, |[x, _, z]| x != 1 || z != 1)

@@ -141,9 +141,9 @@ impl Mending<'_> {
         let before = self.excess;
         for side in [true, false] {
             let mut moved = Vec::new();
-            let mut first = usize::MAX;
-            while first != moved.len() && self.excess != 0 && self.visits > 0 {
-                first = moved.len();
+            let mut earlier = usize::MAX;
+            while earlier != moved.len() && self.excess != 0 && self.visits > 0 {
+                earlier = moved.len();
                 for &cell in cells {
                     if self.is_inside[cell.index()] == side && self.is_simple(cell) {
                         self.is_inside[cell.index()] ^= true;
