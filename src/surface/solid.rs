@@ -83,25 +83,72 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
             return None;
         }
         tried.push(vertices);
-        // Welded along common edges, bodies hang together in another way where one is inside out, or where rounding has turned
-        // their faces around each other.
-        let bodies = in_runs(&built).and_then(|bodies| {
-            let own: Vec<u32> = (0..bodies.vertices.len() as u32).collect();
-            let bodies = build(&bodies, unit, &own, Duplicates::Kept).ok()?;
-            bodies.topology.is_manifold().then_some(bodies)
-        });
-        let by = |way| resolved(built.clone(), weld.clone(), unit, checked, way);
-        let of_bodies = |way| resolved(bodies.clone()?, None, unit, checked, way);
-        let [usual, other] = [Order::SmallerIntoLarger, Order::LargerIntoSmaller].map(Way::Pushed);
-        let ways: [&dyn Fn() -> Option<Loaded>; 4] = [
-            &|| of_bodies(usual).or_else(|| of_bodies(Way::Walls)),
-            &|| by(usual).or_else(|| by(Way::Walls)),
-            &|| of_bodies(other),
-            &|| by(other),
-        ];
-        let walls_alone = by(Way::WallsAlone).or_else(|| of_bodies(Way::WallsAlone));
-        walls_alone.or_else(|| simplest(ways.into_iter().filter_map(|way| way())))
+        joined(&built, weld.as_slice(), unit, checked).or_else(|| {
+            let (built, dropped) = without_flaps(&built, unit)?;
+            let repairs: Vec<Repair> = weld.into_iter().chain([dropped]).collect();
+            joined(&built, &repairs, unit, checked)
+        })
     })
+}
+
+/// The solid of closed, welded triangles, `repairs` of which are known.
+fn joined(
+    built: &Repaired,
+    repairs: &[Repair],
+    unit: Unit,
+    checked: &Inspection,
+) -> Option<Loaded> {
+    // Welded along common edges, bodies hang together in another way where one is inside out, or where rounding has turned
+    // their faces around each other.
+    let bodies = in_runs(built).and_then(|bodies| {
+        let own: Vec<u32> = (0..bodies.vertices.len() as u32).collect();
+        let bodies = build(&bodies, unit, &own, Duplicates::Kept).ok()?;
+        bodies.topology.is_manifold().then_some(bodies)
+    });
+    let by = |way| resolved(built.clone(), repairs, unit, checked, way);
+    let of_bodies = |way| resolved(bodies.clone()?, &[], unit, checked, way);
+    let [usual, other] = [Order::SmallerIntoLarger, Order::LargerIntoSmaller].map(Way::Pushed);
+    let ways: [&dyn Fn() -> Option<Loaded>; 4] = [
+        &|| of_bodies(usual).or_else(|| of_bodies(Way::Walls)),
+        &|| by(usual).or_else(|| by(Way::Walls)),
+        &|| of_bodies(other),
+        &|| by(other),
+    ];
+    let walls_alone = by(Way::WallsAlone).or_else(|| of_bodies(Way::WallsAlone));
+    walls_alone.or_else(|| simplest(ways.into_iter().filter_map(|way| way())))
+}
+
+/// The triangles without pairs of narrow ones that have the same corners and face each other: they bound nothing. None if
+/// there is no pair.
+fn without_flaps(built: &Repaired, unit: Unit) -> Option<(Repaired, Repair)> {
+    let points = unit.forward_all(&built.vertices);
+    let low = points.iter().fold(Vec3::INFINITY, |low, &p| low.min(p));
+    let high = points.iter().fold(Vec3::NEG_INFINITY, |high, &p| high.max(p));
+    let width = WALL * (high - low).length();
+    let is_narrow = |face: [u32; 3]| {
+        let [a, b, c] = face.map(|v| points[v as usize]);
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        (b - a).cross(c - a).length() <= width * longest
+    };
+    let mut single = HashMap::<[u32; 3], Vec<usize>>::new();
+    let mut dropped = vec![false; built.faces.len()];
+    for (f, &face) in built.faces.iter().enumerate().filter(|&(_, &face)| is_narrow(face)) {
+        let [a, b, c] = from_least(face);
+        match single.get_mut(&[a, c, b]).and_then(Vec::pop) {
+            Some(other) => (dropped[f], dropped[other]) = (true, true),
+            None => single.entry([a, b, c]).or_default().push(f),
+        }
+    }
+    let count = dropped.iter().filter(|&&dropped| dropped).count();
+    if count == 0 || count == dropped.len() {
+        return None;
+    }
+    let kept = built.faces.iter().zip(dropped).filter(|(_, dropped)| !dropped);
+    let kept: Vec<[u32; 3]> = kept.map(|(&face, _)| face).collect();
+    let soup = PolygonSoup::of_triangles(&built.vertices, &kept).ok()?;
+    let own: Vec<u32> = (0..soup.vertices.len() as u32).collect();
+    let built = build(&soup, unit, &own, Duplicates::Kept).ok()?;
+    Some((built, Repair::DroppedDuplicateFaces { faces: count }))
 }
 
 /// The triangles with vertices of their own for each of several closed surfaces that follow each other: files list body after
@@ -168,7 +215,7 @@ enum Way {
 /// The solid of welded triangles.
 fn resolved(
     mut built: Repaired,
-    weld: Option<Repair>,
+    first: &[Repair],
     unit: Unit,
     checked: &Inspection,
     way: Way,
@@ -194,7 +241,7 @@ fn resolved(
         );
         !is_of_check
     });
-    repairs.extend(weld.into_iter().chain(walls).chain(turns));
+    repairs.extend(first.iter().cloned().chain(walls).chain(turns));
     let replaced = mesh.faces.len();
     match way {
         Way::WallsAlone => {
@@ -539,15 +586,17 @@ fn oriented(built: Repaired) -> Option<(TriMesh, Vec<Repair>)> {
     Some((TriMesh { vertices, faces }, repairs))
 }
 
+/// The corners of a face in their order, from the least one on.
+fn from_least(mut face: [u32; 3]) -> [u32; 3] {
+    let least = (0..3).min_by_key(|&k| face[k]).unwrap_or_default();
+    face.rotate_left(least);
+    face
+}
+
 /// Faces without those that have the corners and the orientation of an earlier one.
 fn without_repeated(faces: &[[u32; 3]]) -> Vec<[u32; 3]> {
     let mut seen = HashSet::new();
-    let is_new = |face: &&[u32; 3]| {
-        let mut key = **face;
-        let least = (0..3).min_by_key(|&k| face[k]).unwrap_or_default();
-        key.rotate_left(least);
-        seen.insert(key)
-    };
+    let is_new = |face: &&[u32; 3]| seen.insert(from_least(**face));
     faces.iter().filter(is_new).copied().collect()
 }
 

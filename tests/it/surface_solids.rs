@@ -650,6 +650,39 @@ fn bodies_without_volume_are_left_out_of_a_solid() {
 }
 
 #[test]
+fn pairs_of_faces_without_area_are_left_out_wherever_they_are() {
+    let corners =
+        [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0], [1.0, 0.0, 0.0]];
+    let rest = [[0, 2, 4], [4, 2, 1], [0, 4, 3], [4, 1, 3], [0, 3, 2], [1, 2, 3]];
+    let turn = DMat3::from_rotation_z(0.4) * DMat3::from_rotation_x(0.7);
+    for is_turned in [false, true] {
+        let place = |[x, y, z]: [f64; 3]| match Vec3::new(x, y, z) {
+            // In single precision the corners of the pair are on no line.
+            p if is_turned => Vec3::from((turn * p).to_array().map(|x| f64::from(x as f32))),
+            p => p,
+        };
+        let vertices = corners.map(place).to_vec();
+        for (first, second) in
+            (0..8).flat_map(|i| (0..8).map(move |j| (i, j))).filter(|(i, j)| i != j)
+        {
+            let mut rest = rest.into_iter();
+            let faces = (0..8).filter_map(|k| match k {
+                _ if k == first => Some([0, 4, 1]),
+                _ if k == second => Some([4, 0, 1]),
+                _ => rest.next(),
+            });
+            let mesh = TriMesh { vertices: vertices.clone(), faces: faces.collect() };
+            let Loaded { mesh, report } = read(&mesh);
+            assert_eq!(mesh.faces.len(), 6, "{first} {second} {is_turned}");
+            assert!(
+                (report.volume.unwrap() - 4.0 / 3.0).abs() < 1e-6,
+                "{first} {second} {is_turned}"
+            );
+        }
+    }
+}
+
+#[test]
 fn surfaces_with_very_many_intersections_are_named_as_unresolved() {
     let shifted =
         |k| cuboid(Vec3::splat(1e-3 * f64::from(k)), Vec3::splat(1.0 + 1e-3 * f64::from(k)));
