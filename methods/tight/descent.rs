@@ -4,14 +4,16 @@
 //! itself but for small ones. With squares the mean error was a little larger. The second derivative of a power
 //! keeps its factor `p - 1`, so a step is Newton's for residuals that are linear in the spheres.
 
+use std::collections::HashSet;
+
 use medial::Vec3;
 use medial::complex::{MedialMesh, NearestPrimitive};
 use medial::simplifier::RunContext;
 
 use super::block_cholesky::{Normal, Pattern};
 use super::goal::{
-    self, Edited, Goal, Held, Points, Residuals, Row, nearest_after, nearest_balls, places,
-    residuals, vertices,
+    self, CLOSEST, Edited, Goal, Held, Points, Residuals, Row, interpolated, nearest_after,
+    nearest_balls, places, residuals, vertices,
 };
 use super::guard::{Guard, Still, clamp};
 use super::part::Part;
@@ -205,6 +207,21 @@ impl<'a> Descent<'a> {
             damping,
             tolerance,
         })
+    }
+
+    /// Of places outside those whose nearest ball is not next to one that is watched: many can be of balls around one centre.
+    ///
+    /// # Errors
+    /// When the mesh has no union.
+    pub fn unwatched(&self, places: Vec<Vec3>) -> Result<Vec<Vec3>> {
+        let Self { mesh, held, .. } = self;
+        let cube = |held: &Held| {
+            (interpolated(mesh, held).centre / CLOSEST).floor().to_array().map(|x| x as i64)
+        };
+        let mut centres: HashSet<[i64; 3]> = held.iter().map(cube).collect();
+        let balls = nearest_balls(mesh, &places)?;
+        let new = places.into_iter().zip(&balls).filter(|(_, ball)| centres.insert(cube(ball)));
+        Ok(new.map(|(place, _)| place).collect())
     }
 
     /// Adds points, with their residuals, to the descent of a whole mesh.

@@ -43,8 +43,8 @@ pub(super) const ASIDE: f64 = 0.3;
 
 /// Cosine of the angle by which the surface turns at a sharp edge, at most.
 const SHARP: f64 = 0.866;
-/// Smallest distance of samples along sharp edges, a fraction of the diagonal.
-const CLOSEST: f64 = 1e-3;
+/// Smallest distance of samples along sharp edges and of points of the medial mesh, a fraction of the diagonal.
+pub(super) const CLOSEST: f64 = 1e-3;
 
 /// Interior points that are residuals from the start, below 500 spheres and from there on.
 const INTERIOR: [usize; 2] = [2_500, 4_000];
@@ -442,7 +442,7 @@ pub(super) fn vertices(mesh: &MedialMesh, primitive: Primitive) -> ([u32; 3], us
 }
 
 /// The sphere of a medial mesh at some weights of a simplex.
-fn interpolated(mesh: &MedialMesh, held: &Held) -> Sphere {
+pub(super) fn interpolated(mesh: &MedialMesh, held: &Held) -> Sphere {
     let (corners, count) = vertices(mesh, held.primitive);
     let (mut centre, mut radius) = (Vec3::ZERO, 0.0);
     for (v, weight) in corners.into_iter().zip(held.weights).take(count) {
@@ -468,7 +468,7 @@ fn spread_over(mesh: &MedialMesh, count: usize, wanted: impl Fn(&[u32]) -> bool)
     // The spacing `h` with length / h + area / h^2 = count.
     let count = count as f64;
     let root = (total_length * total_length + 4.0 * total_area * count).sqrt();
-    let h = (total_length + root) / (2.0 * count);
+    let h = ((total_length + root) / (2.0 * count)).max(CLOSEST);
     let mut all: Vec<Held> = (0..mesh.spheres.len() as u32)
         .filter(|&v| wanted(&[v]))
         .map(|v| Held { primitive: Primitive::Sphere(v), weights: [1.0, 0.0, 0.0], known: None })

@@ -19,16 +19,18 @@ const WITNESS: f64 = 0.6;
 /// Limit of the witnesses of each kind and search, the largest errors first.
 const WITNESSES: usize = 300;
 
-/// Cell size for thinning witnesses on the surface, on the union's boundary and inside, a fraction of
-/// the diagonal. On the boundary each witness outside means a ball that is watched from then on.
-const APART: [f64; 3] = [0.001, 0.002, 0.001];
+/// Side of the cubes of which each has one witness of a kind, as a share of the largest error. The depth of a pocket falls
+/// as fast as the distance from its bottom: with cubes as large as the error, the search was blind to a tenth of it.
+const APART: f64 = 0.1;
+/// Largest side of these cubes, a fraction of the diagonal.
+const FARTHEST: f64 = 1e-3;
 
 /// The search for the places of the largest errors.
 pub(super) struct Witnesses<'a> {
     goal: &'a Goal,
     search: PeakSearch<'a>,
-    /// Cubes of the sides [`APART`] that have a witness of a kind.
-    seen: HashSet<(u8, [i64; 3])>,
+    /// Cubes that have a witness of a kind, with the binary logarithm of their side.
+    seen: HashSet<(u8, i32, [i64; 3])>,
 }
 
 impl<'a> Witnesses<'a> {
@@ -65,10 +67,11 @@ impl<'a> Witnesses<'a> {
             .filter(|&(gap, _)| gap > WITNESS * error)
             .collect();
         gaps.sort_by(|x, y| y.0.total_cmp(&x.0));
-        let on_surface = self.new_ones(0, forward);
+        let side = (APART * error).min(FARTHEST).log2().floor() as i32;
+        let on_surface = self.new_ones((0, side), forward);
         let samples = on_surface.into_iter().map(|point| Sample { point, weight: 1.0 }).collect();
-        let exposed = self.new_ones(1, reverse);
-        let gaps = self.new_ones(2, gaps.into_iter().map(|(_, point)| point).collect());
+        let exposed = self.new_ones((1, side), reverse);
+        let gaps = self.new_ones((2, side), gaps.into_iter().map(|(_, point)| point).collect());
         // Boundary inside the solid is a pocket. Boundary outside protrudes.
         let weights = exposed.iter().map(|_| 1.0).chain(gaps.iter().map(|_| ASIDE));
         let places = [&exposed[..], &gaps].concat();
@@ -76,16 +79,16 @@ impl<'a> Witnesses<'a> {
         let places = places.into_iter().zip(depths).zip(weights);
         let places = places.map(|((point, depth), weight)| Interior { point, depth, weight });
         let (interior, outside): (Vec<_>, Vec<_>) = places.partition(|place| place.depth > 0.0);
-        let outside = outside.into_iter().map(|place| place.point).collect();
+        let outside = descent.unwatched(outside.into_iter().map(|place| place.point).collect())?;
         descent.join(Points { samples, interior, outside })?;
         Ok(error)
     }
 
     /// The first witnesses of a kind, of each cube one.
-    fn new_ones(&mut self, kind: u8, points: Vec<Vec3>) -> Vec<Vec3> {
+    fn new_ones(&mut self, (kind, side): (u8, i32), points: Vec<Vec3>) -> Vec<Vec3> {
         let new = points.into_iter().filter(|&point| {
-            let cube = (point / APART[usize::from(kind)]).floor().to_array().map(|x| x as i64);
-            self.seen.insert((kind, cube))
+            let cube = (point / f64::from(side).exp2()).floor().to_array().map(|x| x as i64);
+            self.seen.insert((kind, side, cube))
         });
         new.take(WITNESSES).collect()
     }
