@@ -179,7 +179,9 @@ impl Goal {
     pub fn peaks(&self) -> Result<PeakSearch<'_>, MetricError> {
         let seed = self.seed ^ STREAM;
         let envelope_samples = 2 * SEARCHED;
-        let options = DistanceOptions { surface_samples: SEARCHED, envelope_samples, seed };
+        let rest = SEARCHED.saturating_sub(self.surface.vertices.len());
+        let surface_samples = rest.max(SEARCHED / SHARE_OF_VERTICES);
+        let options = DistanceOptions { surface_samples, envelope_samples, seed };
         PeakSearch::new(&self.surface, &self.tree, options)
     }
 

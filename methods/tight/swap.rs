@@ -46,10 +46,7 @@ pub(super) fn swapped<'a>(
     run: &RunContext,
 ) -> Result<Option<Descent<'a>>> {
     let count = descent.mesh.spheres.len();
-    let Some(mut mesh) = with_inserted(descent, each, skipped) else { return Ok(None) };
-    let of: Vec<_> = (0..mesh.spheres.len()).map(|v| (v < count).then_some(v as u32)).collect();
-    settle(descent, &mut mesh, &of, &INSERTED, run)?;
-    let mut trial = descent.edited(mesh, &of)?;
+    let Some(mut trial) = inserted(descent, each, skipped, run)? else { return Ok(None) };
     while trial.mesh.spheres.len() > count {
         run.step(0, 1)?;
         let Some(Passed { mut mesh, of }) = collapse::pass(&trial, count, true, run)? else {
@@ -60,6 +57,47 @@ pub(super) fn swapped<'a>(
     }
     // Parts of a face that crosses another one count each.
     Ok((trial.guard.crossings() <= descent.guard.crossings()).then_some(trial))
+}
+
+/// The mesh with up to `each` spheres more at the largest errors but the `skipped` first; `None` if nothing can be inserted.
+///
+/// # Errors
+/// When the run is cancelled.
+pub(super) fn inserted<'a>(
+    descent: &Descent<'a>,
+    each: usize,
+    skipped: usize,
+    run: &RunContext,
+) -> Result<Option<Descent<'a>>> {
+    let count = descent.mesh.spheres.len();
+    let Some(mut mesh) = with_inserted(descent, each, skipped) else { return Ok(None) };
+    let of: Vec<_> = (0..mesh.spheres.len()).map(|v| (v < count).then_some(v as u32)).collect();
+    settle(descent, &mut mesh, &of, &INSERTED, run)?;
+    Ok(Some(descent.edited(mesh, &of)?))
+}
+
+/// The same union of `count` primitives' spheres, if it has fewer: with spheres in the middle of the longest edges.
+pub(super) fn padded(mesh: &MedialMesh, count: usize) -> MedialMesh {
+    let mut edit = Edit::new(mesh);
+    while edit.spheres.len() < count {
+        let length = |&[a, b]: &[u32; 2]| {
+            edit.spheres[a as usize].centre.distance(edit.spheres[b as usize].centre)
+        };
+        let longest = edit.edges.iter().max_by(|x, y| length(x).total_cmp(&length(y)));
+        match longest.copied() {
+            Some([a, b]) => {
+                let middle = edit.spheres[a as usize].lerp(edit.spheres[b as usize], 0.5);
+                edit.split_edge([a, b], middle);
+            }
+            // A single sphere gets one inside of it.
+            None => {
+                let Sphere { centre, radius } = edit.spheres[0];
+                let new = edit.push(Sphere::new(centre, 0.5 * radius));
+                edit.edges.insert([0, new]);
+            }
+        }
+    }
+    edit.mesh()
 }
 
 /// The mesh with up to `count` spheres more, at the largest errors but the `skipped` first, no two at one
@@ -183,11 +221,16 @@ impl Edit {
             Primitive::Sphere(_) => return false,
             _ => (by_weight[0].1, by_weight[1].1),
         };
-        let (a, b) = (a.min(b), a.max(b));
         if by_weight[0].0 > AT_END {
             return false;
         }
-        let new = self.push(foot);
+        self.split_edge([a.min(b), a.max(b)], foot);
+        true
+    }
+
+    /// Puts a sphere between the ends of an edge, and of the same side of all its faces.
+    fn split_edge(&mut self, [a, b]: [u32; 2], middle: Sphere) {
+        let new = self.push(middle);
         self.edges.remove(&[a, b]);
         self.edges.insert([a, new]);
         self.edges.insert([b, new]);
@@ -200,7 +243,6 @@ impl Edit {
             self.faces.insert([a.min(apex), a.max(apex), new]);
             self.faces.insert([b.min(apex), b.max(apex), new]);
         }
-        true
     }
 }
 

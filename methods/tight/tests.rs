@@ -11,9 +11,9 @@ use rand_pcg::Pcg64;
 use super::block_cholesky::{Normal, Pattern};
 use super::collapse::{Passed, pass};
 use super::descent::{Descent, Objective};
-use super::goal::{Goal, Row, vertices};
+use super::goal::{Goal, Row, union_of, vertices};
 use super::guard::{Guard, Sheets, Still};
-use super::swap::{settle, swapped};
+use super::swap::{padded, settle, swapped};
 use crate::test_shape as shape;
 
 /// Parameters that are good enough for simple shapes, and quick.
@@ -247,6 +247,36 @@ fn a_given_mesh_of_no_more_spheres_keeps_its_connectivity_and_loses_error() {
     let after = judge.distances(&polished).unwrap();
     assert!(after.mean < 0.9 * before.mean, "{before:?} before, {after:?} after");
     assert!(after.hausdorff < 1.01 * before.hausdorff, "{before:?} before, {after:?} after");
+}
+
+#[test]
+fn more_spheres_are_not_worse_where_the_axis_is_flat() {
+    let shape = shape("box", 6);
+    let tight = crate::find("tight").unwrap();
+    let mut levels = tight.prepare(&shape, &quick(), &RunContext::default()).unwrap();
+    let judge = shape.judge(None, Default::default()).unwrap();
+    let errors = [20, 50, 100].map(|count| {
+        let found = levels.at(Level::Spheres(count)).unwrap().mesh;
+        assert_eq!((found.spheres.len(), betti(&found)), (count, [1, 0, 0]));
+        judge.distances(&found).unwrap().hausdorff
+    });
+    assert!(errors[1] <= 1.01 * errors[0] && errors[2] <= 1.01 * errors[1], "{errors:?}");
+}
+
+#[test]
+fn spheres_in_the_middle_of_edges_leave_the_union_as_it_is() {
+    let shape = shape("torus", 24);
+    let single = MedialMesh::from_simplices(vec![start(&shape, 30).spheres[0]], vec![], vec![]);
+    for mesh in [start(&shape, 30), single.unwrap()] {
+        let padded = padded(&mesh, 75);
+        padded.check().unwrap();
+        assert_eq!((padded.spheres.len(), betti(&padded)), (75, betti(&mesh)));
+        let [before, after] = [&mesh, &padded].map(|mesh| union_of(mesh).unwrap());
+        for p in &shape.mesh().vertices {
+            let [before, after] = [&before, &after].map(|union| union.signed_batch(&[*p])[0]);
+            assert!((before - after).abs() < 1e-9, "{before} {after}");
+        }
+    }
 }
 
 #[test]
