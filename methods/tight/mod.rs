@@ -488,7 +488,7 @@ const ROUND_STEPS: usize = 8;
 const GAIN: f64 = 0.01;
 
 /// Consecutive rounds without a gain that are accepted.
-const PATIENCE: usize = 1;
+const PATIENCE: usize = 2;
 
 /// Limit of the swaps after the rounds.
 const MAX_SWAPS: usize = 24;
