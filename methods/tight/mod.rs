@@ -23,7 +23,7 @@
 //!    with the least measured error is the result.
 //! 7. *Grow* (this file): where a collapse to the next smaller number among 10, 20, 50, 100 and so on does not raise the error,
 //!    as of flat solids, steps 1 to 7 are made for that number, too. If its error is smaller, spheres are inserted as in 5, and in
-//!    the middle of edges, which leaves the union as it is. So more spheres are not worse.
+//!    the middle of edges, which leaves the union as it is. So more spheres are hardly ever worse.
 //!
 //! # Notation
 //!
