@@ -27,7 +27,7 @@ const SAMPLES: [usize; 2] = [6_000, 12_000];
 /// `abc_bracket`.
 const SHARE_OF_EDGES: f64 = 0.1;
 
-/// Samples of the surface from which the largest errors are searched. The union has twice as many. More
+/// Samples of the surface, with its vertices, from which the largest errors are searched. The union has twice as many. More
 /// gave the same errors at 100 spheres.
 const SEARCHED: usize = 8_000;
 

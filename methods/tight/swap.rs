@@ -76,7 +76,7 @@ pub(super) fn inserted<'a>(
     Ok(Some(descent.edited(mesh, &of)?))
 }
 
-/// The same union of `count` primitives' spheres, if it has fewer: with spheres in the middle of the longest edges.
+/// The same union with at least `count` spheres: new ones are in the middle of the longest edges.
 pub(super) fn padded(mesh: &MedialMesh, count: usize) -> MedialMesh {
     let mut edit = Edit::new(mesh);
     while edit.spheres.len() < count {

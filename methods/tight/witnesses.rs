@@ -19,8 +19,8 @@ const WITNESS: f64 = 0.6;
 /// Limit of the witnesses of each kind and search, the largest errors first.
 const WITNESSES: usize = 300;
 
-/// Side of the cubes of which each has one witness of a kind, as a share of the largest error. The depth of a pocket falls
-/// as fast as the distance from its bottom: with cubes as large as the error, the search was blind to a tenth of it.
+/// Side of cubes that hold at most one witness of a kind, as a share of the largest error. The depth of a pocket falls by the
+/// distance from its bottom: cubes as large as the error would hide a tenth of it.
 const APART: f64 = 0.1;
 /// Largest side of these cubes, a fraction of the diagonal.
 const FARTHEST: f64 = 1e-3;

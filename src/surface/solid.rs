@@ -91,7 +91,7 @@ pub(super) fn resolve(soup: &PolygonSoup, unit: Unit, checked: &Inspection) -> O
     })
 }
 
-/// The solid of closed, welded triangles, `repairs` of which are known.
+/// The solid of closed, welded triangles. `repairs` are those made so far.
 fn joined(
     built: &Repaired,
     repairs: &[Repair],
@@ -106,7 +106,7 @@ fn joined(
         bodies.topology.is_manifold().then_some(bodies)
     });
     let by = |way| resolved(built.clone(), repairs, unit, checked, way);
-    let of_bodies = |way| resolved(bodies.clone()?, &[], unit, checked, way);
+    let of_bodies = |way| resolved(bodies.clone()?, repairs, unit, checked, way);
     let [usual, other] = [Order::SmallerIntoLarger, Order::LargerIntoSmaller].map(Way::Pushed);
     let ways: [&dyn Fn() -> Option<Loaded>; 4] = [
         &|| of_bodies(usual).or_else(|| of_bodies(Way::Walls)),
@@ -215,7 +215,7 @@ enum Way {
 /// The solid of welded triangles.
 fn resolved(
     mut built: Repaired,
-    first: &[Repair],
+    earlier: &[Repair],
     unit: Unit,
     checked: &Inspection,
     way: Way,
@@ -241,7 +241,7 @@ fn resolved(
         );
         !is_of_check
     });
-    repairs.extend(first.iter().cloned().chain(walls).chain(turns));
+    repairs.extend(earlier.iter().cloned().chain(walls).chain(turns));
     let replaced = mesh.faces.len();
     match way {
         Way::WallsAlone => {

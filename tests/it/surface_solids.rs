@@ -674,6 +674,11 @@ fn pairs_of_faces_without_area_are_left_out_wherever_they_are() {
             let mesh = TriMesh { vertices: vertices.clone(), faces: faces.collect() };
             let Loaded { mesh, report } = read(&mesh);
             assert_eq!(mesh.faces.len(), 6, "{first} {second} {is_turned}");
+            let is_named = report.repairs.iter().any(|repair| {
+                let component = Repair::DroppedComponents { components: 1, faces: 2 };
+                *repair == component || *repair == Repair::DroppedDuplicateFaces { faces: 2 }
+            });
+            assert!(is_named, "{first} {second} {is_turned}: {:?}", report.repairs);
             assert!(
                 (report.volume.unwrap() - 4.0 / 3.0).abs() < 1e-6,
                 "{first} {second} {is_turned}"
