@@ -21,9 +21,10 @@
 //!    local ascent and a sweep of both sides, join the samples, and balls are watched where the union came out of the solid;
 //!    then swaps as in 5, each with a second chance, and rounds again. The state
 //!    with the least measured error is the result.
-//! 7. *Grow* (this file): where a collapse to the next smaller number among 10, 20, 50, 100 and so on does not raise the error,
-//!    as of flat solids, steps 1 to 7 are made for that number, too. If its error is smaller, spheres are inserted as in 5, and in
-//!    the middle of edges, which leaves the union as it is. So more spheres are hardly ever worse.
+//! 7. *Grow* (this file): where fewer spheres seem as good, steps 1 to 7 are made for the next smaller number among 10, 20, 50, 100
+//!    and so on, too. That is so where a start of that number is much closer than the usual one, as if the axis is a curve or a
+//!    point, and where the collapse from 4 to it does not raise the error, as of flat solids. If its error is smaller, spheres are
+//!    inserted as in 5, and in the middle of edges, which leaves the union as it is. So more spheres are hardly ever worse.
 //!
 //! # Notation
 //!
@@ -177,7 +178,7 @@ impl PreparedTight {
     /// Steps 1 to 7.
     fn simplified(&self, count: usize, diagnostics: &mut Diagnostics) -> Result<State> {
         let Self { goal, params, run, .. } = self;
-        let start = self.start.mesh(count, run, diagnostics)?;
+        let (start, coarse) = self.start.meshes(count, run, diagnostics)?;
         bounded(start.spheres.len())?;
         let is_polish = start.spheres.len() <= count;
         diagnostics.count("crossing_faces_of_the_start", crossing_faces(&start).len());
@@ -192,6 +193,18 @@ impl PreparedTight {
             }
             return polish.run(descent, witnesses, diagnostics);
         }
+        descent.run(Objective::power(POWER, descent.largest()), PASS_STEPS[1], run)?;
+        let with_fewer = |fewer| {
+            let smaller = self.simplified(fewer, &mut Diagnostics::default())?;
+            Ok::<_, SimplifyError>(Some(smaller).filter(|found| found.mesh.spheres.len() < count))
+        };
+        let fewer = fewer(count);
+        if let (Some(fewer), Some(coarse)) = (fewer, coarse)
+            && is_much_closer(coarse, &descent, run)?
+            && let Some(smaller) = with_fewer(fewer)?
+        {
+            return self.grown(&smaller, count, diagnostics);
+        }
         descent = reduced(descent, count, &mut witnesses, run)?;
         let reached = descent.mesh.spheres.len();
         if reached > count {
@@ -200,11 +213,7 @@ impl PreparedTight {
                  homotopy type and folds no face"
             ));
         }
-        let fewer = fewer(count).filter(|_| reached == count);
-        let with_fewer = |fewer| {
-            let smaller = self.simplified(fewer, &mut Diagnostics::default())?;
-            Ok::<_, SimplifyError>(Some(smaller).filter(|found| found.mesh.spheres.len() < count))
-        };
+        let fewer = fewer.filter(|_| reached == count);
         let mut smaller = match fewer {
             Some(fewer) if is_as_good_with(&descent, fewer, run)? => with_fewer(fewer)?,
             _ => None,
@@ -233,6 +242,7 @@ impl PreparedTight {
         let mut descent = Descent::new(goal, goal.points(count), best.mesh.clone())?;
         let mut witnesses = Witnesses::new(goal)?;
         let mut error = witnesses.join(&mut descent, f64::INFINITY)?;
+        let (mut idle, mut least) = (0, error);
         while error > LEAST && descent.mesh.spheres.len() < count {
             let spheres = descent.mesh.spheres.len();
             let each = (count - spheres).min(spheres.div_ceil(GROWN));
@@ -240,6 +250,11 @@ impl PreparedTight {
             descent = larger;
             descent.run(Objective::power(POWER, descent.largest()), PASS_STEPS[1], run)?;
             error = witnesses.join(&mut descent, f64::INFINITY)?;
+            idle = if error < (1.0 - GAIN) * least { 0 } else { idle + 1 };
+            least = least.min(error);
+            if idle > PATIENCE {
+                break;
+            }
         }
         if descent.mesh.spheres.len() > best.mesh.spheres.len() {
             let polish = Polish { goal, params, run, swaps: false, bound: None };
@@ -252,6 +267,10 @@ impl PreparedTight {
         Ok(best)
     }
 }
+
+/// Largest error of a start of few spheres after a few steps, in errors of the usual start, up to which the axis counts as a curve
+/// or a point. Spheres on its facets only hinder each other.
+const CLOSER: f64 = 0.5;
 
 /// Spheres for each one that is inserted at once while a state grows.
 const GROWN: usize = 4;
@@ -270,6 +289,13 @@ const FAR_BELOW: f64 = 0.25;
 fn fewer(count: usize) -> Option<usize> {
     let rungs = std::iter::successors(Some([10, 20, 50]), |rungs| Some(rungs.map(|n| 10 * n)));
     rungs.take_while(|rungs| rungs[0] < count).flatten().take_while(|&rung| rung < count).last()
+}
+
+/// Whether a start of fewer spheres is much closer after a few steps than one of many.
+fn is_much_closer(few: MedialMesh, many: &Descent<'_>, run: &RunContext) -> Result<bool> {
+    let mut few = Descent::new(many.goal, many.points.clone(), few)?;
+    few.run(Objective::power(POWER, few.largest()), PASS_STEPS[1], run)?;
+    Ok(few.largest() < CLOSER * many.largest())
 }
 
 /// Whether fewer spheres seem to have an error as small.
@@ -305,7 +331,6 @@ fn reduced<'a>(
     witnesses: &mut Witnesses<'a>,
     run: &RunContext,
 ) -> Result<Descent<'a>> {
-    descent.run(Objective::power(POWER, descent.largest()), PASS_STEPS[1], run)?;
     while descent.mesh.spheres.len() > count {
         let spheres = descent.mesh.spheres.len();
         let near = usize::from(spheres <= MANY * count);
@@ -414,23 +439,23 @@ impl Start {
         }
     }
 
-    /// The start for a number of spheres.
+    /// The start for a number of spheres, and one of the next smaller number.
     ///
     /// # Errors
     /// Those of the other method.
-    fn mesh(
+    fn meshes(
         &self,
         count: usize,
         run: &RunContext,
         diagnostics: &mut Diagnostics,
-    ) -> Result<MedialMesh> {
+    ) -> Result<(MedialMesh, Option<MedialMesh>)> {
         let [few, many] = [MANY, ENOUGH].map(|times| times.saturating_mul(count));
         let wanted = self.least.max(few).max(many.min(MOST_NEEDED));
         let enough = if self.shape.has_given_initial() { count } else { wanted };
-        self.simplified(wanted, enough, run, diagnostics)
+        self.simplified(wanted, enough, fewer(count), run, diagnostics)
     }
 
-    /// A start of `wanted` spheres, or the initial medial mesh if it has at most `enough`.
+    /// A start of `wanted` spheres, and one of `fewer`; the initial medial mesh alone if it has at most `enough`.
     ///
     /// # Errors
     /// Those of the other method.
@@ -438,12 +463,13 @@ impl Start {
         &self,
         wanted: usize,
         enough: usize,
+        fewer: Option<usize>,
         run: &RunContext,
         diagnostics: &mut Diagnostics,
-    ) -> Result<MedialMesh> {
+    ) -> Result<(MedialMesh, Option<MedialMesh>)> {
         let initial = self.shape.initial()?;
-        let mesh = if initial.spheres.len() <= enough {
-            MedialMesh::clone(&initial)
+        let (mesh, coarse) = if initial.spheres.len() <= enough {
+            (MedialMesh::clone(&initial), None)
         } else {
             let mut levels = self.starter.prepare(&self.shape, &Params::none(), run)?;
             let found = levels.at(Level::Spheres(wanted))?;
@@ -455,9 +481,10 @@ impl Start {
                     .into_iter()
                     .for_each(|warning| diagnostics.warn(warning));
             }
-            found.mesh
+            let coarse = fewer.map(|fewer| levels.at(Level::Spheres(fewer))).transpose()?;
+            (found.mesh, coarse.map(|coarse| coarse.mesh))
         };
-        Ok(MedialMesh { contacts: None, ..mesh })
+        Ok((MedialMesh { contacts: None, ..mesh }, coarse))
     }
 }
 
@@ -859,7 +886,7 @@ impl Within<'_> {
         let Self { start, goal, run, .. } = *self;
         let mut wanted = self.params.start.max(MANY);
         loop {
-            let mesh = start.simplified(wanted, wanted, run, diagnostics)?;
+            let (mesh, _) = start.simplified(wanted, wanted, None, run, diagnostics)?;
             let spheres = mesh.spheres.len();
             bounded(spheres)?;
             let mut descent = Descent::new(goal, goal.points(MOST), mesh)?;
@@ -920,9 +947,10 @@ impl Within<'_> {
         count: usize,
     ) -> Result<(Descent<'_>, Witnesses<'_>, f64)> {
         let Self { goal, run, .. } = *self;
-        let descent = Descent::new(goal, goal.points(count), mesh.clone())?;
+        let mut descent = Descent::new(goal, goal.points(count), mesh.clone())?;
+        descent.run(Objective::power(POWER, descent.largest()), PASS_STEPS[1], run)?;
         let mut witnesses = Witnesses::new(goal)?;
-        let mut descent = reduced(descent, count, &mut witnesses, run)?;
+        descent = reduced(descent, count, &mut witnesses, run)?;
         let error = witnesses.join(&mut descent, f64::INFINITY)?;
         Ok((descent, witnesses, error))
     }

@@ -4,7 +4,7 @@ use medial::Vec3;
 use medial::complex::collapse::CollapseComplex;
 use medial::complex::{MedialMesh, Sphere, betti, crossing_faces};
 use medial::shape::Shape;
-use medial::simplifier::{Level, Params, RunContext, SimplifyError};
+use medial::simplifier::{Level, Params, RunContext, Simplified, SimplifyError};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -261,6 +261,22 @@ fn more_spheres_are_not_worse_where_the_axis_is_flat() {
         judge.distances(&found).unwrap().hausdorff
     });
     assert!(errors[1] <= 1.01 * errors[0], "{errors:?}");
+}
+
+/// Spheres on the facets of a ball hinder each other: the result is grown from that with few.
+#[test]
+fn more_spheres_are_not_worse_where_the_axis_is_a_point() {
+    let shape = shape("sphere", 12);
+    let tight = crate::find("tight").unwrap();
+    let mut levels = tight.prepare(&shape, &quick(), &RunContext::default()).unwrap();
+    let judge = shape.judge(None, Default::default()).unwrap();
+    let [few, many] = [10, 50].map(|count| levels.at(Level::Spheres(count)).unwrap());
+    let grown = |found: &Simplified| {
+        found.diagnostics.counts.iter().any(|(name, _)| name == "grown_from_spheres")
+    };
+    assert_eq!((grown(&few), grown(&many)), (false, true));
+    let [few, many] = [few, many].map(|found| judge.distances(&found.mesh).unwrap().hausdorff);
+    assert!(many <= 1.01 * few, "{few} {many}");
 }
 
 #[test]
