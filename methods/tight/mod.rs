@@ -275,8 +275,9 @@ const CLOSER: f64 = 0.5;
 /// Spheres for each one that is inserted at once while a state grows.
 const GROWN: usize = 4;
 
-/// Largest error with fewer spheres before the swaps, in errors with more, at which a run with fewer follows. A collapse to half the
-/// spheres raises it by a third and more, but not where the axis is of few flat sheets, which passes find by chance.
+/// Fourth power mean of the errors with fewer spheres before the swaps, in that with more, at which a run with fewer follows. A
+/// collapse to half the spheres raises it by a third and more, but not where the axis is of few flat sheets, which passes find by
+/// chance.
 const AS_GOOD: f64 = 1.1;
 /// Least error of the result, below which it follows in any case, a fraction of the diagonal: only an axis of flat sheets is met
 /// as closely.
@@ -300,7 +301,8 @@ fn is_much_closer(few: MedialMesh, many: &Descent<'_>, run: &RunContext) -> Resu
 
 /// Whether fewer spheres seem to have an error as small.
 fn is_as_good_with(descent: &Descent<'_>, fewer: usize, run: &RunContext) -> Result<bool> {
-    let largest = descent.largest();
+    let judge = Objective::power(POWER, descent.largest());
+    let limit = AS_GOOD.powi(POWER) * descent.value(&judge);
     let Descent { goal, points, mesh, .. } = descent;
     let mut smaller = Descent::new(goal, points.clone(), mesh.clone())?;
     while smaller.mesh.spheres.len() > fewer {
@@ -308,7 +310,7 @@ fn is_as_good_with(descent: &Descent<'_>, fewer: usize, run: &RunContext) -> Res
         let Some(passed) = passed(&smaller, target, 1, run)? else { return Ok(false) };
         smaller = passed;
     }
-    Ok(smaller.largest() <= AS_GOOD * largest)
+    Ok(smaller.value(&judge) <= limit)
 }
 
 /// # Errors
