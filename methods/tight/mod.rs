@@ -44,7 +44,7 @@
 //! - The result depends on the samples, hence on the seed and on the orientation of the input; docs/tight.md
 //!   has figures.
 //! - The native level `error` is a bound of the two-sided error, a fraction of the diagonal, held by a
-//!   certificate. It takes two to four times as long as the number of spheres that is found.
+//!   certificate. It takes one to three times as long as the number of spheres that is found.
 //!
 //! # Starting from a given mesh
 //!
@@ -112,7 +112,7 @@ pub struct Tight {
 /// The `tight` simplifier, starting from the result of `starter`.
 ///
 /// Supports [`Level::Spheres`] up to a few thousand, at the cost of some hundred evaluations of all samples, and
-/// [`Level::Native`], a bound of the two-sided error, at two to four times that.
+/// [`Level::Native`], a bound of the two-sided error, at one to three times that.
 pub fn method(starter: impl MedialSimplifier + 'static) -> Tight {
     let info = MethodInfo::new("tight", "Tight")
         .seeded()
@@ -278,7 +278,7 @@ const GROWN: usize = 4;
 /// Fourth power mean of the errors with fewer spheres before the swaps, in that with more, at which a run with fewer follows. A
 /// collapse to half the spheres raises it by a third and more, but not where the axis is of few flat sheets, which passes find by
 /// chance.
-const AS_GOOD: f64 = 1.1;
+const AS_GOOD: f64 = 1.12;
 /// Least error of the result, below which it follows in any case, a fraction of the diagonal: only an axis of flat sheets is met
 /// as closely.
 const EXACT: f64 = 3e-4;
