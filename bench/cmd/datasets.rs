@@ -35,7 +35,7 @@ enum Action {
 struct Make {
     /// Id of the shape.
     id: String,
-    /// Write the surface to this file (OFF, OBJ, PLY).
+    /// Write the surface to this file (OFF, OBJ, PLY, STL).
     #[arg(short, long)]
     output: PathBuf,
     /// Set the resolution; its meaning depends on the shape [default: as in `compare`].

@@ -15,7 +15,7 @@ use crate::output::print_result;
 pub struct Arguments {
     /// Surface (OFF, OBJ, PLY, STL).
     input: PathBuf,
-    /// Write the repaired surface (OFF, OBJ, PLY).
+    /// Write the repaired surface (OFF, OBJ, PLY, STL).
     #[arg(short, long)]
     output: PathBuf,
     /// Close holes of up to 500 edges by triangles between their vertices.

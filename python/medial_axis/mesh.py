@@ -196,7 +196,7 @@ class Mesh:
         """Writes a file, completely or not at all.
 
         Args:
-            path: A `.ply`, `.off` or `.obj` file.
+            path: A `.ply`, `.off`, `.obj` or `.stl` file; STL is written as text.
 
         Raises:
             InputError: It has another extension, or cannot be written.

@@ -182,6 +182,7 @@ impl Evidence<'_> {
             intersecting_pairs_complete: found.complete,
             degenerate_faces: found.degenerate_faces,
             diagonal: raw_diagonal(self.mesh),
+            extents: self.mesh.bounding_box().map_or([0.0; 3], |(lo, hi)| (hi - lo).to_array()),
             boundary_edges: t.boundary_edges,
             nonmanifold_edges: t.nonmanifold_edges,
             nonmanifold_vertices: t.nonmanifold_vertices,

@@ -152,13 +152,13 @@ fn times_power(mut value: f64, mut power: i32) -> f64 {
     value
 }
 
-/// Writes a mesh in the format of the extension: `.off`, `.obj` or `.ply`.
+/// Writes a mesh in the format of the extension: `.off`, `.obj`, `.ply` or `.stl`.
 ///
-/// A file of that name is replaced, but only by a complete one.
+/// A file of that name is replaced, but only by a complete one. STL is written as text with all digits, because its
+/// binary form has single precision, and holds each vertex once for every face: vertices are in another order when it is read.
 ///
 /// # Errors
-/// When the extension is unknown or `.stl` (single precision would move vertices), or the file
-/// cannot be written.
+/// When the extension is unknown, or the file cannot be written.
 ///
 /// ```no_run
 /// let loaded = medial::surface::read("scan.stl")?;
@@ -172,16 +172,15 @@ pub fn write(path: impl AsRef<Path>, mesh: &TriMesh) -> Result<(), SurfaceError>
 }
 
 fn replace(path: &Path, mesh: &TriMesh, format: Format) -> Result<(), Fault> {
-    if format == Format::Stl {
-        let why = format!("{format} holds single precision only; write .off, .obj or .ply");
-        return Err(Fault::Unsupported(why));
-    }
     write_atomically(path, |out| write_to(out, mesh, format))
         .map_err(|error| Fault::Io(format!("cannot be written: {error}")))
 }
 
 /// The text of a mesh in a format of text.
 fn write_to(out: &mut dyn Write, mesh: &TriMesh, format: Format) -> io::Result<()> {
+    if format == Format::Stl {
+        return write_stl(out, mesh);
+    }
     let (vertices, faces) = (mesh.vertices.len(), mesh.faces.len());
     let (vertex_word, face_word, base) = match format {
         Format::Obj => ("v ", "f", 1),
@@ -195,7 +194,7 @@ fn write_to(out: &mut dyn Write, mesh: &TriMesh, format: Format) -> io::Result<(
             writeln!(out, "element face {faces}")?;
             writeln!(out, "property list uchar uint vertex_indices\nend_header")?;
         }
-        Format::Obj | Format::Stl => {}
+        _ => {}
     }
     for v in &mesh.vertices {
         writeln!(out, "{vertex_word}{:?} {:?} {:?}", v.x, v.y, v.z)?;
@@ -205,6 +204,23 @@ fn write_to(out: &mut dyn Write, mesh: &TriMesh, format: Format) -> io::Result<(
         writeln!(out, "{face_word} {a} {b} {c}")?;
     }
     Ok(())
+}
+
+fn write_stl(out: &mut dyn Write, mesh: &TriMesh) -> io::Result<()> {
+    writeln!(out, "solid medial")?;
+    for face in 0..mesh.faces.len() {
+        let corners = mesh.triangle(face);
+        // In the unit of its longest side: squares of very small or large ones are not representable.
+        let [a, b] = [corners[1] - corners[0], corners[2] - corners[0]];
+        let longest = a.abs().max_element().max(b.abs().max_element());
+        let normal = (a / longest).cross(b / longest).normalize_or_zero();
+        writeln!(out, "facet normal {:?} {:?} {:?}\nouter loop", normal.x, normal.y, normal.z)?;
+        for v in corners {
+            writeln!(out, "vertex {:?} {:?} {:?}", v.x, v.y, v.z)?;
+        }
+        writeln!(out, "endloop\nendfacet")?;
+    }
+    writeln!(out, "endsolid medial")
 }
 
 #[cfg(test)]

@@ -249,6 +249,8 @@ pub struct SurfaceReport {
     pub degenerate_faces: usize,
     /// Diagonal of the bounding box, in the unit of the file.
     pub diagonal: f64,
+    /// Sides of the bounding box along x, y and z, in the unit of the file.
+    pub extents: [f64; 3],
     /// Number of edges with one face.
     pub boundary_edges: usize,
     /// Number of edges with more than two faces.
