@@ -62,6 +62,10 @@ fn print_report(report: &SurfaceReport) {
         pairs => format!("more than {pairs} pairs of faces"),
     };
     let genus = report.genus.map_or_else(|| "undefined".to_owned(), |genus| genus.to_string());
+    let extents = report.extents.map(|side| significant(side, 4)).join(" x ");
+    let measured = |value: Option<f64>| {
+        value.map_or_else(|| "undefined".to_owned(), |value| significant(value, 4))
+    };
     let lines = [
         ("vertices", report.vertices.to_string()),
         ("faces", report.faces.to_string()),
@@ -72,7 +76,10 @@ fn print_report(report: &SurfaceReport) {
         ("oriented", yes(report.oriented).to_owned()),
         ("self-intersections", intersecting),
         ("zero-area faces", report.degenerate_faces.to_string()),
+        ("extents", extents),
         ("diagonal", significant(report.diagonal, 4)),
+        ("area", measured(report.area)),
+        ("volume", measured(report.volume)),
     ];
     for (label, value) in lines {
         print_line(&format!("  {label:<20} {value}"));
