@@ -45,7 +45,7 @@ mod write;
 
 pub use comparison::remarks_of_meshes;
 pub use header::{Header, MethodNote, RunNote};
-pub use metric::measured_rows;
+pub use metric::{BRIEF, MeasuredRow, measured_rows};
 pub use overview::{reasons, summary_text};
 pub use pictures::{PictureStrip, picture_strips};
 pub use site::write_site;

@@ -499,9 +499,37 @@ pub const METRICS: &[Metric] = &[
     TOTAL_SECONDS,
 ];
 
-/// Every metric that was measured on at least one of some medial meshes: a row with its name and unit, and a cell for
-/// each mesh, `-` where it was not measured there.
-pub fn measured_rows(evaluations: &[&Evaluation]) -> Vec<(String, Vec<String>)> {
+/// The groups of metrics that `medial evaluate` prints by default, each with its keys.
+pub const BRIEF: [(&str, &[&str]); 3] = [
+    (
+        "error, in % of the diagonal",
+        &[
+            "hausdorff",
+            "certified_lower",
+            "certified_upper",
+            "mean",
+            "epsilon_union",
+            "reverse",
+            "uncovered",
+            "overshoot",
+        ],
+    ),
+    ("solid", &["volume_error", "centres_outside"]),
+    ("triangles and spikes", &["spikes", "min_angle_mean", "below_10"]),
+];
+
+/// A metric of some medial meshes.
+pub struct MeasuredRow {
+    /// Its key in [`METRICS`].
+    pub key: &'static str,
+    /// Its name and unit.
+    pub title: String,
+    /// A text for each mesh, `-` where it was not measured.
+    pub cells: Vec<String>,
+}
+
+/// Every metric that was measured on at least one of some medial meshes.
+pub fn measured_rows(evaluations: &[&Evaluation]) -> Vec<MeasuredRow> {
     let mut rows = vec![];
     for metric in METRICS {
         let Value::Evaluation(value) = metric.value else { continue };
@@ -511,7 +539,8 @@ pub fn measured_rows(evaluations: &[&Evaluation]) -> Vec<(String, Vec<String>)> 
                 .map(|value| value.map(|value| metric.format(metric.times * value)))
                 .map(|text| text.unwrap_or_else(|| "-".to_owned()))
                 .collect();
-            rows.push((format!("{}{}", metric.title, metric.unit_suffix()), cells));
+            let title = format!("{}{}", metric.title, metric.unit_suffix());
+            rows.push(MeasuredRow { key: metric.key, title, cells });
         }
     }
     rows
@@ -536,5 +565,6 @@ mod tests {
         let keys: BTreeSet<&str> = METRICS.iter().map(|metric| metric.key).collect();
         assert_eq!(keys.len(), METRICS.len());
         assert!(COMPARED.iter().all(|metric| keys.contains(metric.key)));
+        assert!(BRIEF.iter().flat_map(|(_, of)| *of).all(|key| keys.contains(key)));
     }
 }

@@ -6,7 +6,7 @@ use clap::Args;
 use medial::complex::LoadedMa;
 use medial::metrics::{Evaluation, MetricError, Witness, WitnessSide};
 use medial::shape::{Fit, ShapeOptions};
-use medial_reports::measured_rows;
+use medial_reports::{BRIEF, MeasuredRow, measured_rows};
 use medial_run::axis::read_axis;
 use medial_run::evaluate::Evaluator;
 use medial_run::text::{aligned, significant};
@@ -42,6 +42,9 @@ pub struct Arguments {
     /// Measure the spheres alone, without edges and faces.
     #[arg(long)]
     spheres_alone: bool,
+    /// Print all metrics.
+    #[arg(long)]
+    all: bool,
     /// Compare the sheets with those of this medial mesh, such as a dense axis of the surface.
     #[arg(long, value_name = "X.ma")]
     reference: Option<PathBuf>,
@@ -80,12 +83,12 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         let row = rows.remove(0)?;
         row.notes.iter().for_each(|line| note(global, line));
         let warnings = [&row.defects[..], warnings].concat();
-        let text = described(&row.evaluation);
+        let text = described(&row.evaluation, arguments.all);
         let all = [&row.evaluation.warnings[..], &warnings].concat();
         return Ok(print_result(global, &row, &text, &all));
     }
     let refused = rows.iter().filter(|row| row.is_err()).count();
-    print_table(&arguments.axes, &rows, warnings, global);
+    print_table(arguments, &rows, warnings, global);
     Ok(match refused {
         0 => Exit::Done,
         _ if refused == rows.len() => Exit::Input,
@@ -132,7 +135,7 @@ fn evaluate(
 
 /// The evaluations next to each other: a row for each metric, a column for each file.
 fn print_table(
-    files: &[PathBuf],
+    Arguments { axes: files, all, .. }: &Arguments,
     rows: &[Result<Evaluated, Failure>],
     warnings: &[String],
     global: &Global,
@@ -179,7 +182,9 @@ fn print_table(
             words.unwrap_or_default()
         }));
     }
-    table.extend(measured_rows(&evaluations));
+    let is_shown = |key| *all || BRIEF.iter().any(|(_, keys)| keys.contains(&key));
+    let rows = measured_rows(&evaluations).into_iter().filter(|row| is_shown(row.key));
+    table.extend(rows.map(|MeasuredRow { title, cells, .. }| (title, cells)));
     let lines = table.into_iter().map(|(title, cells)| [vec![title], cells].concat());
     print_line(aligned(&lines.collect::<Vec<_>>(), |k| k > 0).trim_end());
     for (file, row) in measured {
@@ -190,8 +195,8 @@ fn print_table(
     warnings.iter().for_each(|warning| print_line(&format!("warning: {warning}")));
 }
 
-/// Every metric, lengths in percent of the diagonal.
-fn described(evaluation: &Evaluation) -> String {
+/// Some metrics in groups, or `all`, lengths in percent of the diagonal.
+fn described(evaluation: &Evaluation, all: bool) -> String {
     let counts = &evaluation.counts;
     let mut text = format!(
         "{}, {} ({} without a face), {}",
@@ -200,14 +205,25 @@ fn described(evaluation: &Evaluation) -> String {
         counts.lone_edges,
         counted(counts.faces, "face")
     );
-    let mut add = |name: &str, value: &str| text += &format!("\n  {name:<32} {value}");
+    let line = |name: &str, value: &str| format!("\n  {name:<32} {value}");
     let betti = match evaluation.expected_betti {
         Some(expected) => format!("{:?} (the solid's: {expected:?})", evaluation.betti),
         None => format!("{:?}", evaluation.betti),
     };
-    for (metric, mut values) in measured_rows(&[evaluation]) {
-        add(&metric, &values.remove(0));
+    let rows = measured_rows(&[evaluation]);
+    if !all {
+        for (group, keys) in BRIEF {
+            text += &format!("\n  {group}");
+            if group == "solid" {
+                text += &line("  Betti numbers", &betti);
+            }
+            let shown = rows.iter().filter(|row| keys.contains(&row.key));
+            shown.for_each(|row| text += &line(&format!("  {}", row.title), &row.cells[0]));
+        }
+        return text + "\n  all metrics: --all";
     }
+    let mut add = |name: &str, value: &str| text += &line(name, value);
+    rows.iter().for_each(|row| add(&row.title, &row.cells[0]));
     add("Betti numbers", &betti);
     if let Some(structure) = &evaluation.structure {
         add("structure", &structure.graph.to_string());
