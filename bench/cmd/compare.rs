@@ -21,7 +21,7 @@ use crate::rebuild::{Rebuilt, STUDY, of_items, report_of_run, write_study};
 use crate::store::{AXES, PAGE, RESULTS, Store};
 use crate::study::edition::{Edition, Mixed};
 use crate::study::external::ExternalResult;
-use crate::study::registry::Registry;
+use crate::study::registry::{INITIAL, Registry};
 use crate::study::{Study, StudyMethod, shard, unique_names};
 
 #[derive(Debug, Args)]
@@ -40,6 +40,9 @@ pub struct Arguments {
     /// [default: all but those that run on request].
     #[arg(long, value_name = "ID[:KEY=VALUE]", value_delimiter = ',')]
     methods: Vec<String>,
+    /// Leave out the methods with these ids.
+    #[arg(long, value_name = "ID", value_delimiter = ',')]
+    without: Vec<String>,
     /// Simplify to these sphere counts [default: 200,100,50; 100,50 without a mesh].
     #[arg(long, value_name = "COUNTS", value_delimiter = ',')]
     spheres: Vec<usize>,
@@ -119,6 +122,7 @@ pub fn run(
         registry.add_plugins(&study.resolved(file)).map_err(Failure::usage)?;
     }
     registry.remarks.iter().for_each(|remark| note(global, remark));
+    arguments.apply_without(&mut study, registry)?;
     arguments.apply_levels(&mut study, registry)?;
     let provenance = provenance();
     let mut items = study.items(registry, &provenance)?;
@@ -274,6 +278,28 @@ fn absolute(path: &PathBuf) -> PathBuf {
 }
 
 impl Arguments {
+    /// Takes the methods of `--without` out of the study.
+    fn apply_without(&self, study: &mut Study, registry: &Registry) -> Result<(), Failure> {
+        if self.without.is_empty() {
+            return Ok(());
+        }
+        study.methods = study.entries(registry)?.into_iter().map(|(method, _)| method).collect();
+        for id in &self.without {
+            if id == INITIAL {
+                return Err(Failure::usage(format!("--without {id}: use --counts-only")));
+            }
+            let before = study.methods.len();
+            study.methods.retain(|row| row.id != *id);
+            if study.methods.len() == before {
+                return Err(Failure::usage(format!("--without {id}: no method with this id runs")));
+            }
+        }
+        if study.methods.iter().all(|row| row.id == INITIAL) {
+            return Err(Failure::usage("--without: no method is left"));
+        }
+        Ok(())
+    }
+
     /// Applies `--levels` to the methods of the study.
     fn apply_levels(&self, study: &mut Study, registry: &Registry) -> Result<(), Failure> {
         if self.levels.is_empty() {

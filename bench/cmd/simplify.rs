@@ -32,9 +32,9 @@ pub struct Arguments {
     /// Simplify to N spheres.
     #[arg(long, value_name = "N", conflicts_with_all = ["level", "max_error"])]
     spheres: Option<usize>,
-    /// Simplify to native level X, in the unit of the method.
-    #[arg(long, value_name = "X", conflicts_with = "max_error", allow_negative_numbers = true)]
-    level: Option<f64>,
+    /// Simplify to native level X, in the unit of the method, or to its `published` level [default with --method].
+    #[arg(long, value_name = "X", conflicts_with = "max_error", allow_negative_numbers = true, value_parser = level)]
+    level: Option<Target>,
     /// Search the fewest spheres with a symmetric Hausdorff error of at most E, a fraction of the diagonal.
     #[arg(long, value_name = "E", value_parser = error_bound)]
     max_error: Option<f64>,
@@ -116,6 +116,16 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     Ok(print_result(global, &object, &text, &warnings))
 }
 
+/// A native level, or the published one.
+fn level(text: &str) -> Result<Target, String> {
+    match text {
+        "published" => Ok(Target::Published),
+        _ => {
+            text.parse().map(Target::Native).map_err(|_| "expected a number or `published`".into())
+        }
+    }
+}
+
 impl Arguments {
     /// The named method, or the default where each method takes the level.
     fn entry<'r>(&self, registry: &'r Registry) -> Result<&'r Entry, Failure> {
@@ -132,8 +142,7 @@ impl Arguments {
         match (self.max_error, self.spheres, self.level) {
             (Some(bound), ..) => Target::MaxError(bound),
             (_, Some(count), _) => Target::Spheres(count),
-            (.., Some(value)) => Target::Native(value),
-            _ => Target::Published,
+            (.., level) => level.unwrap_or_default(),
         }
     }
 

@@ -42,6 +42,8 @@ fn without_a_mesh_few_shapes_run() {
     assert_eq!(at.json(line).1["run"], 3);
     let meshes = ["bracket", "torus", "blob"];
     assert!(at.records("report").iter().zip(meshes).all(|(record, mesh)| record["mesh"] == mesh));
+    let without = line.replace("--methods pmat", "--methods pmat,sat,qmat --without sat,qmat");
+    assert_eq!(at.json(&format!("{without} --fresh")).1["run"], 3);
     let (_, object) = at.json(&format!("{line} --dataset builtin"));
     assert!(object["found"] == 3 && object["records"].as_u64() > Some(10), "{object}");
 }

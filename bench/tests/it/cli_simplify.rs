@@ -42,6 +42,14 @@ fn axis_simplify_evaluate_convert() {
     assert!(lower > 0.0 && upper - lower <= 1e-3, "{object}");
     assert!(number(&object["hausdorff"]) <= upper, "{object}");
 
+    let [published, default] = ["--level published", ""].map(|level| {
+        at.json(&format!("simplify box.off --method angle {level} -o angle.ma"));
+        at.text("angle.ma")
+    });
+    assert_eq!(published, default);
+    let line = "simplify box.off --method angle --level usual";
+    at.refused(line, 2, "expected a number or `published`");
+
     let from_file = "simplify box.off --method qmat --spheres 60 --initial axis.ma";
     assert_eq!(at.json(from_file).1["spheres"], 60);
     at.done("convert simple.ma simple.ply");
