@@ -520,7 +520,7 @@ pub const BRIEF: [(&str, &[&str]); 3] = [
 
 /// A metric of some medial meshes.
 pub struct MeasuredRow {
-    /// Its key in [`METRICS`].
+    /// Its column in the CSV.
     pub key: &'static str,
     /// Its name and unit.
     pub title: String,
