@@ -21,8 +21,8 @@ pub struct Arguments {
     /// Surface (OFF, OBJ, PLY, STL), medial mesh (.ma and its dialects, .ply or .obj with radii), or list of spheres
     /// (.csv, .json, .yaml, .xrdf, .urdf, .xml, .txt, .xyzr).
     from: PathBuf,
-    /// Surface (OFF, OBJ, PLY, STL as text), medial mesh (.ma, .ply, .obj, .vtp for ParaView, .glb for Blender and browsers), or list
-    /// of spheres: .csv, .json, .yaml (cuRobo), .xrdf (Isaac), .urdf, .xml (MuJoCo), .txt or .xyzr (clumps).
+    /// Surface (OFF, OBJ, PLY, STL as text), medial mesh (.ma, .ply, .obj, .vtp for ParaView, .glb for Blender and
+    /// browsers), or list of spheres: .csv, .json, .yaml (cuRobo), .xrdf (Isaac), .urdf, .xml (MuJoCo), .txt or .xyzr (clumps).
     /// `.glb` has single precision, and its upward axis y is z of the input.
     to: PathBuf,
     /// Read all lines of a medial mesh whose header states a different number.

@@ -42,7 +42,7 @@ pub struct Arguments {
     /// Measure the spheres alone, without edges and faces.
     #[arg(long)]
     spheres_alone: bool,
-    /// Print all metrics.
+    /// Print all metrics; `--reference` does, too.
     #[arg(long)]
     all: bool,
     /// Compare the sheets with those of this medial mesh, such as a dense axis of the surface.
@@ -83,7 +83,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         let row = rows.remove(0)?;
         row.notes.iter().for_each(|line| note(global, line));
         let warnings = [&row.defects[..], warnings].concat();
-        let text = described(&row.evaluation, arguments.all);
+        let text = described(&row.evaluation, arguments.is_complete());
         let all = [&row.evaluation.warnings[..], &warnings].concat();
         return Ok(print_result(global, &row, &text, &all));
     }
@@ -94,6 +94,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         _ if refused == rows.len() => Exit::Input,
         _ => Exit::SomeFailed,
     })
+}
+
+impl Arguments {
+    /// Whether all metrics are printed: those of a reference are not among the usual ones.
+    fn is_complete(&self) -> bool {
+        self.all || self.reference.is_some()
+    }
 }
 
 /// One medial mesh against the surface.
@@ -135,11 +142,12 @@ fn evaluate(
 
 /// The evaluations next to each other: a row for each metric, a column for each file.
 fn print_table(
-    Arguments { axes: files, all, .. }: &Arguments,
+    arguments: &Arguments,
     rows: &[Result<Evaluated, Failure>],
     warnings: &[String],
     global: &Global,
 ) {
+    let (files, all) = (&arguments.axes, arguments.is_complete());
     for failure in rows.iter().filter_map(|row| row.as_ref().err()) {
         print_error(&format!("medial: {}", failure.message));
     }
@@ -182,7 +190,7 @@ fn print_table(
             words.unwrap_or_default()
         }));
     }
-    let is_shown = |key| *all || BRIEF.iter().any(|(_, keys)| keys.contains(&key));
+    let is_shown = |key| all || BRIEF.iter().any(|(_, keys)| keys.contains(&key));
     let rows = measured_rows(&evaluations).into_iter().filter(|row| is_shown(row.key));
     table.extend(rows.map(|MeasuredRow { title, cells, .. }| (title, cells)));
     let lines = table.into_iter().map(|(title, cells)| [vec![title], cells].concat());
@@ -210,15 +218,25 @@ fn described(evaluation: &Evaluation, all: bool) -> String {
         Some(expected) => format!("{:?} (the solid's: {expected:?})", evaluation.betti),
         None => format!("{:?}", evaluation.betti),
     };
+    let witness = evaluation.certified.map(|certified| {
+        let Witness { point, on } = certified.witness;
+        let on = match on {
+            WitnessSide::Surface => "surface",
+            WitnessSide::Union => "union",
+        };
+        let [x, y, z] = point.to_array().map(|x| significant(x, 4));
+        format!("on the {on}: {x} {y} {z}")
+    });
     let rows = measured_rows(&[evaluation]);
     if !all {
+        text += &line("Betti numbers", &betti);
         for (group, keys) in BRIEF {
             text += &format!("\n  {group}");
-            if group == "solid" {
-                text += &line("  Betti numbers", &betti);
-            }
             let shown = rows.iter().filter(|row| keys.contains(&row.key));
             shown.for_each(|row| text += &line(&format!("  {}", row.title), &row.cells[0]));
+        }
+        if let Some(witness) = witness {
+            text += &line("farthest point", &witness);
         }
         return text + "\n  all metrics: --all";
     }
@@ -233,14 +251,8 @@ fn described(evaluation: &Evaluation, all: bool) -> String {
             add("sheets compared", &text);
         }
     }
-    if let Some(certified) = evaluation.certified {
-        let Witness { point, on } = certified.witness;
-        let on = match on {
-            WitnessSide::Surface => "surface",
-            WitnessSide::Union => "union",
-        };
-        let [x, y, z] = point.to_array().map(|x| significant(x, 4));
-        add("farthest point", &format!("on the {on}: {x} {y} {z}"));
+    if let Some(witness) = witness {
+        add("farthest point", &witness);
     }
     text
 }

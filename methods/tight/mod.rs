@@ -276,8 +276,8 @@ const CLOSER: f64 = 0.5;
 const GROWN: usize = 4;
 
 /// Fourth power mean of the errors with fewer spheres before the swaps, in that with more, at which a run with fewer follows. A
-/// collapse to half the spheres raises it by a third and more, but not where the axis is of few flat sheets, which passes find by
-/// chance.
+/// collapse to half the spheres mostly raises it by a third and more, but not where the axis is of few flat sheets, which
+/// passes find by chance.
 const AS_GOOD: f64 = 1.12;
 /// Least error of the result, below which it follows in any case, a fraction of the diagonal: only an axis of flat sheets is met
 /// as closely.
@@ -486,7 +486,8 @@ impl Start {
             let coarse = fewer.map(|fewer| levels.at(Level::Spheres(fewer))).transpose()?;
             (found.mesh, coarse.map(|coarse| coarse.mesh))
         };
-        Ok((MedialMesh { contacts: None, ..mesh }, coarse))
+        let bare = |mesh| MedialMesh { contacts: None, ..mesh };
+        Ok((bare(mesh), coarse.map(bare)))
     }
 }
 
@@ -516,7 +517,7 @@ const ROUND_STEPS: usize = 8;
 /// Share by which a round or a swap has to lower the error to count as a gain.
 const GAIN: f64 = 0.01;
 
-/// Consecutive rounds without a gain that are accepted.
+/// Consecutive rounds, or insertions while a state grows, without a gain that are accepted.
 const PATIENCE: usize = 2;
 
 /// Limit of the swaps after the rounds.

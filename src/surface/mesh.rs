@@ -155,7 +155,8 @@ fn times_power(mut value: f64, mut power: i32) -> f64 {
 /// Writes a mesh in the format of the extension: `.off`, `.obj`, `.ply` or `.stl`.
 ///
 /// A file of that name is replaced, but only by a complete one. STL is written as text with all digits, because its
-/// binary form has single precision, and holds each vertex once for every face: vertices are in another order when it is read.
+/// binary form has single precision. It holds a vertex once for every face: when it is read, vertices are in another
+/// order, and those at one position are one.
 ///
 /// # Errors
 /// When the extension is unknown, or the file cannot be written.
@@ -194,7 +195,7 @@ fn write_to(out: &mut dyn Write, mesh: &TriMesh, format: Format) -> io::Result<(
             writeln!(out, "element face {faces}")?;
             writeln!(out, "property list uchar uint vertex_indices\nend_header")?;
         }
-        _ => {}
+        Format::Obj | Format::Stl => {}
     }
     for v in &mesh.vertices {
         writeln!(out, "{vertex_word}{:?} {:?} {:?}", v.x, v.y, v.z)?;
