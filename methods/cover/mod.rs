@@ -2,7 +2,7 @@
 //!
 //! A method of this project, for collision models and grains made of spheres.
 //!
-//! # One problem behind three moods
+//! # One problem behind three fits
 //!
 //! For a solid K let `depth(c)` be the distance of an inner point `c` to the surface, and
 //! `f_c(p) = |p - c| - depth(c)` the distance from `p` to the largest inner ball at `c`. For centres `C`
@@ -14,12 +14,12 @@
 //! is the largest distance from a point of K to the inner balls. A ball of radius `depth(c) + t` is nowhere
 //! farther than `t` from K. So with the radii
 //!
-//! - `depth(c)`, the balls fit into K, and leave `G` uncovered (`mood=inside`);
-//! - `depth(c) + G`, they contain K, and protrude by `G` at most (`mood=outside`);
-//! - `depth(c) + G / 2`, they do both by `G / 2` at most (`mood=balanced`),
+//! - `depth(c)`, the balls fit into K, and leave `G` uncovered (`fit=inside`);
+//! - `depth(c) + G`, they contain K, and protrude by `G` at most (`fit=outside`);
+//! - `depth(c) + G / 2`, they do both by `G / 2` at most (`fit=balanced`),
 //!
 //! and for these centres no other radii do better, as long as a ball protrudes by its radius less its
-//! depth. All moods minimise `G` over the centres. An inner ball that is contained in another has the larger
+//! depth. All fits minimise `G` over the centres. An inner ball that is contained in another has the larger
 //! `f` everywhere, so centres of medial balls are enough.
 //!
 //! # Steps
@@ -35,13 +35,13 @@
 //! 5. *Rounds*: the descent sees all points with a large gap, and a part of the others, selected again and
 //!    again; the witness of the certificate joins them.
 //! 6. *Proof*: the upper end of the certified interval of `G` ([`CoverTest::uncovered`]) decides the radii. With
-//!    `mood=outside` a margin is added to them, and doubled twice until the interval of the spheres ends at 0.
+//!    `fit=outside` a margin is added to them, and doubled twice until the interval of the spheres ends at 0.
 //!
 //! With `radii=equal` the depth in `f_c` is that of the least deep centre, and `G` the covering radius of
 //! the centres less that depth. Candidates and steps are restricted to centres of at least a common depth, which is
 //! the best of a sequence of depths for the start.
 //!
-//! The native level is the allowed error of the mood: a search over N.
+//! The native level is the allowed error of the fit: a search over N.
 
 mod placement;
 #[cfg(test)]
@@ -129,7 +129,8 @@ medial::parameters! {
     pub struct CoverParams {
         /// The spheres contain the solid (`outside`), fit into it (`inside`), or deviate from it by the same
         /// on both sides (`balanced`).
-        mood: Mood = Mood::Balanced, "balanced, outside or inside";
+        #[serde(alias = "mood")]
+        fit: Fit = Fit::Balanced, "balanced, outside or inside";
         /// Whether each sphere has the radius that suits it (`free`), or all have the same (`equal`).
         radii: Radii = Radii::Free, "free or equal";
     }
@@ -148,7 +149,7 @@ pub enum Radii {
 /// The side on which spheres deviate from a solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Mood {
+pub enum Fit {
     /// The larger error of both sides is least.
     Balanced,
     /// Nothing is uncovered, and the overshoot is least.
@@ -274,12 +275,12 @@ impl PreparedCover<'_> {
         Ok((balls, gap))
     }
 
-    /// Step 6: the certified error of the side, or sides, on which spheres of the mood deviate.
+    /// Step 6: the certified error of the side, or sides, on which spheres of the fit deviate.
     fn error(&self, inner: &[Sphere], gap: OneSided) -> Result<f64> {
-        Ok(match self.params.mood {
-            Mood::Balanced => 0.5 * gap.upper,
-            Mood::Outside => self.proven(inner, gap)?,
-            Mood::Inside => gap.upper + WITHIN,
+        Ok(match self.params.fit {
+            Fit::Balanced => 0.5 * gap.upper,
+            Fit::Outside => self.proven(inner, gap)?,
+            Fit::Inside => gap.upper + WITHIN,
         })
     }
 
@@ -290,7 +291,7 @@ impl PreparedCover<'_> {
         error: f64,
         diagnostics: Diagnostics,
     ) -> Result<Simplified> {
-        let added = if self.params.mood == Mood::Inside { -WITHIN } else { error };
+        let added = if self.params.fit == Fit::Inside { -WITHIN } else { error };
         let mesh = MedialMesh::from_simplices(grown(inner, added), vec![], vec![])?;
         checked(level, mesh, Some(error), diagnostics)
     }
@@ -318,8 +319,8 @@ impl PreparedCover<'_> {
     fn within(&self, bound: f64) -> Result<Simplified> {
         let range = (Bound::Excluded(BEYOND), Bound::Excluded(f64::INFINITY));
         level_within("error", bound, range)?;
-        let mood = self.params.mood;
-        let allowed = if mood == Mood::Balanced { 2.0 * bound } else { bound };
+        let fit = self.params.fit;
+        let allowed = if fit == Fit::Balanced { 2.0 * bound } else { bound };
         let solid = Solid::new(self.shape, &self.tree, &self.inside, self.run.seed);
         let candidates = solid.candidates(1);
         let gaps = Gaps::new(&candidates, &solid.points(1, &candidates));

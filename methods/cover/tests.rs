@@ -1,16 +1,16 @@
-//! Proofs of the three moods, closed forms, and bad levels.
+//! Proofs of the three fits, closed forms, and bad levels.
 
 use medial::Vec3;
 use medial::metrics::CoverTest;
 use medial::shape::Shape;
 use medial::simplifier::{Level, MedialSimplifier, Params, RunContext, Simplified, SimplifyError};
 
-use super::{BEYOND, method};
+use super::{BEYOND, CoverParams, Fit, method};
 use crate::{test_cuboid as cuboid, test_shape};
 
-fn run(shape: &Shape, mood: &str, level: Level) -> Result<Simplified, SimplifyError> {
+fn run(shape: &Shape, fit: &str, level: Level) -> Result<Simplified, SimplifyError> {
     let mut params = Params::none();
-    params.set("mood", mood);
+    params.set("fit", fit);
     method().prepare(shape, &params, &RunContext::default())?.at(level)
 }
 
@@ -22,18 +22,26 @@ fn errors(shape: &Shape, result: &Simplified) -> [f64; 2] {
     [test.uncovered(balls, 1e-4), test.overshoot(balls, 1e-4)].map(|e| e.expect("balls").upper)
 }
 
+/// The parameter had another name before.
+#[test]
+fn the_old_word_for_the_fit_is_accepted() {
+    let mut params = Params::none();
+    params.set("mood", "inside");
+    assert_eq!(params.typed::<CoverParams>().unwrap().fit, Fit::Inside);
+}
+
 #[test]
 fn one_sphere_of_a_cube() {
     let cube = cuboid(Vec3::ONE);
     // The diagonal is 1: half a side is 1 / sqrt 12, and the centre is best.
     let gap = (3_f64.sqrt() - 1.0) / 12_f64.sqrt();
-    for (mood, expected) in
+    for (fit, expected) in
         [("inside", [gap, 0.0]), ("outside", [0.0, gap]), ("balanced", [0.5 * gap, 0.5 * gap])]
     {
-        let found = errors(&cube, &run(&cube, mood, Level::Spheres(1)).expect("a sphere"));
+        let found = errors(&cube, &run(&cube, fit, Level::Spheres(1)).expect("a sphere"));
         for (found, expected) in found.into_iter().zip(expected) {
-            assert!((found - expected).abs() < 2e-3, "{mood}: {found} {expected}");
-            assert!(expected > 0.0 || found == 0.0, "{mood}: {found} is no proof");
+            assert!((found - expected).abs() < 2e-3, "{fit}: {found} {expected}");
+            assert!(expected > 0.0 || found == 0.0, "{fit}: {found} is no proof");
         }
     }
 }
@@ -71,17 +79,17 @@ fn equal_radii_are_equal_and_proven() {
     let shapes = [cuboid(Vec3::new(4.0, 2.0, 1.0)), test_shape("torus", torus.default_resolution)];
     for shape in &shapes {
         let mut gaps = vec![];
-        for (mood, side) in [("outside", 0), ("inside", 1), ("balanced", 2)] {
+        for (fit, side) in [("outside", 0), ("inside", 1), ("balanced", 2)] {
             let mut params = Params::none();
-            params.set("mood", mood);
+            params.set("fit", fit);
             params.set("radii", "equal");
             let run = RunContext::default();
             let prepared = method().prepare(shape, &params, &run);
             let result = prepared.expect("prepared").at(Level::Spheres(24)).expect("spheres");
             let balls = &result.mesh.spheres;
-            assert!(balls.iter().all(|ball| ball.radius == balls[0].radius), "{mood}");
+            assert!(balls.iter().all(|ball| ball.radius == balls[0].radius), "{fit}");
             let found = errors(shape, &result);
-            assert!(found.get(side).is_none_or(|&error| error == 0.0), "{mood}: {found:?}");
+            assert!(found.get(side).is_none_or(|&error| error == 0.0), "{fit}: {found:?}");
             gaps.push(found[0].max(found[1]));
         }
         let free = run(shape, "outside", Level::Spheres(24)).expect("spheres");
@@ -93,12 +101,12 @@ fn equal_radii_are_equal_and_proven() {
 #[test]
 fn an_error_gives_few_spheres_within_it() {
     let shape = cuboid(Vec3::new(4.0, 2.0, 1.0));
-    for mood in ["outside", "balanced"] {
-        let found = run(&shape, mood, Level::Native(0.04)).expect("spheres");
+    for fit in ["outside", "balanced"] {
+        let found = run(&shape, fit, Level::Native(0.04)).expect("spheres");
         let largest = errors(&shape, &found).into_iter().fold(0.0, f64::max);
-        assert!(largest <= 0.04 + 1e-4, "{mood}: {largest}");
-        let fewer = run(&shape, mood, Level::Spheres(found.mesh.spheres.len() * 4 / 5));
-        assert!(fewer.expect("spheres").native_level > Some(0.04), "{mood}");
+        assert!(largest <= 0.04 + 1e-4, "{fit}: {largest}");
+        let fewer = run(&shape, fit, Level::Spheres(found.mesh.spheres.len() * 4 / 5));
+        assert!(fewer.expect("spheres").native_level > Some(0.04), "{fit}");
     }
 }
 

@@ -105,7 +105,7 @@ class Tight(Options, total=False):
 class Cover(Options, total=False):
     """Options of `cover`."""
 
-    mood: Literal["balanced", "outside", "inside"]
+    fit: Literal["balanced", "outside", "inside"]
     radii: Literal["free", "equal"]
 
 

@@ -104,17 +104,17 @@ print(" " * 44, *(f"{k:>9}" for k in ("uncovered", "points", "witness", "upper",
 for surface in surfaces:
     run(*(["datasets", "make", surface[8:], "-o"] if surface.startswith("builtin:") else ["convert", surface]), file)
     solid = Solid(file)
-    for method, spheres, mood in SETS:
-        options = ["--set", f"mood={mood}"] if mood else []
+    for method, spheres, fit in SETS:
+        options = ["--set", f"fit={fit}"] if fit else []
         run("simplify", file, "--method", method, "--spheres", spheres, *options, "-o", axis)
         balls = np.array([line.split()[1:5] for line in axis.read_text().splitlines() if line[0] == "v"], float)
-        for grown in (0,) if mood else (0, 0.6):  # by a part of the gap: both errors remain
+        for grown in (0,) if fit else (0, 0.6):  # by a part of the gap: both errors remain
             balls[:, 3] += grown and grown * solid.size * found["uncovered"]["upper"]
             axis.write_text("\n".join([f"{len(balls)} 0 0"] + ["v {!r} {!r} {!r} {!r}".format(*ball) for ball in balls.tolist()]))
             found = json.loads(run("evaluate", file, axis, "--samples", 1000, "--certify", 0.001))["cover"]
             values, agrees = compare(solid, np.column_stack([solid.scaled(balls[:, :3]), balls[:, 3] / solid.size]), found)
             count, failed = count + 1, failed + (not agrees)
-            label = f"{Path(surface).name}, {method} {mood} {'inflated' if grown else ''}"
+            label = f"{Path(surface).name}, {method} {fit} {'inflated' if grown else ''}"
             print(f"{label:44}", *(f"{100 * value:9.5f}" for value in values), "" if agrees else "DIFFERS", flush=True)
 row |= {"input": f"{count} sphere sets", "result": f"{POINTS} points each: {failed} outside the certified intervals"}
 print(json.dumps({**row, "agrees": "no" if failed else "yes"}))

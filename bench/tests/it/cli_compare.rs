@@ -87,7 +87,7 @@ fn native_levels_bounds_and_the_start_are_rows() {
 #[test]
 fn spheres_alone_have_a_table_of_cover() {
     let at = Folder::new();
-    let line = "compare builtin:capsule --methods cover:mood=outside,cover:mood=inside,qmat --spheres 12 \
+    let line = "compare builtin:capsule --methods cover:fit=outside,cover:fit=inside,qmat --spheres 12 \
                 --counts-only --samples 500 -q --out report";
     let table = |more: &str| {
         at.done(&format!("{line} {more}"));
@@ -102,7 +102,7 @@ fn spheres_alone_have_a_table_of_cover() {
     for record in records.iter().filter(|r| r["evaluate"]["counts"]["edges"] == 0) {
         let [uncovered, overshoot] =
             ["uncovered", "overshoot"].map(|side| &record["evaluate"]["cover"][side]["upper"]);
-        match record["simplify"]["params"]["mood"].as_str() {
+        match record["simplify"]["params"]["fit"].as_str() {
             Some("outside") => assert_eq!(uncovered, 0.0, "{record}"),
             Some("inside") => assert_eq!(overshoot, 0.0, "{record}"),
             _ => assert!(uncovered.as_f64() > Some(0.0), "{record}"),

@@ -18,7 +18,7 @@ fn wrong_parameters_are_refused_by_name() {
         ("coverage-axis", "select=all"),
         ("vmas", "lambda=0 lambda=1.5 iterations=0 points=faces"),
         ("tight", "lambda=-1 samples=99 rounds=1001"),
-        ("cover", "mood=sad mood=1 radii=same"),
+        ("cover", "fit=sad fit=1 radii=same"),
     ] {
         let found = medial_methods::find(method).expect("registered");
         for (key, value) in wrong.split(' ').filter_map(|pair| pair.split_once('=')) {
