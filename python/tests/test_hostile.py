@@ -45,7 +45,7 @@ def with_value(row: int, value: float) -> Any:
         (CORNERS, FACES[:, :2], r"faces: expected the shape \(n, 3\)"),
         (CORNERS, FACES - 1, "faces: row 0"),
         (CORNERS, FACES + 2**40, "faces: row 0"),
-        (CORNERS, FACES + 1, "face 1 names the vertex 4"),
+        (CORNERS, FACES + 1, "face 1 refers to vertex 4"),
         (CORNERS, FACES[:3], "open|boundary"),
         (CORNERS, FACES[:0], "no face"),
         (CORNERS[:0], FACES[:0], "no face"),

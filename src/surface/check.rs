@@ -50,7 +50,14 @@ pub(super) fn orient_and_examine(repaired: Repaired) -> Inspection {
     let wrong = topology.component.iter().map(|&c| wrong.get(c as usize) == Some(&true));
     topology::turn_over(&mut mesh.faces, wrong);
     report.repairs = repairs;
-    Inspection { mesh, report, refused: fault.map(Into::into), resolved: None, file: None }
+    Inspection {
+        mesh,
+        report,
+        refused: fault.map(Into::into),
+        resolved: None,
+        file: None,
+        file_vertex,
+    }
 }
 
 /// Examines a mesh as it is: nothing is repaired, every defect is a fault.

@@ -235,10 +235,10 @@ mod tests {
         assert_eq!(ply::parse(&file).unwrap().polygon(0), [0, 1, 2]);
         let message = |bytes: &[u8]| ply::parse(bytes).unwrap_err().to_string();
         let cut = message(&file[..file.len() - 1]);
-        assert_eq!(cut, "end of file: expected face 0 of 1, found nothing more");
+        assert_eq!(cut, "the file ends before face 0 of 1");
         let last = file.len() - 1;
         file[last] = 9;
-        assert_eq!(message(&file), "face 0 names the vertex 9 of 3 vertices");
+        assert_eq!(message(&file), "face 0 refers to vertex 9, but there are 3 vertices");
         let from_end = file.len() - 13 - 4;
         file[from_end..from_end + 4].copy_from_slice(&f32::INFINITY.to_be_bytes());
         assert_eq!(message(&file), "vertex 2 has the coordinate inf, which is not finite");
@@ -272,33 +272,33 @@ mod tests {
     }
 
     /// Files with their errors.
-    const OFF_ERRORS: &str = r#" => end of file: expected the keyword OFF, found nothing more
-OFF => end of file: expected the number of vertices, found nothing more
+    const OFF_ERRORS: &str = r#" => the file ends before the keyword OFF
+OFF => the file ends before the number of vertices
 ply\n => line 1: expected the keyword OFF, found "ply"
 OFF\n1 -1 0\n0 0 0\n => line 2: expected the number of faces, found "-1"
 OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n => line 6: expected 3 vertices of face 0, got 2, found the end of the line
 OFF\n3 1 0\n0 0 0 1\n1 0 0\n0 1 0\n3 0 1 2\n => line 3: expected the end of the line (other numbers than a colour need a prefix of OFF), found "1"
 OFF\n3 1 0\n0 0 0\n1,5 0 0\n0 1 0\n3 0 1 2\n => line 4: expected 3 coordinates of vertex 1 of 3, found "1,5", a decimal comma
 OFF\n3 1 0\n0 0 0\n1 x 0\n0 1 0\n3 0 1 2\n => line 4: expected 3 coordinates of vertex 1 of 3, found "x"
-OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n => line 6: face 0 names the vertex 3 of 3 vertices
-OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n => line 6: face 0 has 2 corners; three are the least
+OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n => line 6: face 0 refers to vertex 3, but there are 3 vertices
+OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n => line 6: face 0 has 2 corners; at least 3 are needed
 OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 2 1\n => line 7: expected no number after the 1 announced faces, found "3"
-OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n => end of file: expected face 1 of 2, found nothing more
+OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n => the file ends before face 1 of 2
 OFF\n1000000000 2 0\n0 0 0\n => the header announces 1000000000 vertices, but the file holds only 7 bytes more
 OFF\n1 1 0\n0 1e999 0\n3 0 0 0\n => line 3: vertex 0 has the coordinate inf, which is not finite
 OFF BINARY\n => binary OFF is not read; write the surface as text
 4OFF\n => OFF with four or n dimensions is not a surface in space"#;
     const OBJ_ERRORS: &str = r#"v 0 0 zero\n => line 1: expected 3 coordinates after v, found "zero"
 v 0 0\nv => line 1: expected 3 coordinates after v, found the end of the line
-v 0 0 => end of file: expected 3 coordinates after v, found nothing more
+v 0 0 => the file ends before 3 coordinates after v
 v 0 0 nan\n => line 1: vertex 0 has the coordinate NaN, which is not finite
 v 0 0 0\nf 1 1 x\n => line 2: expected v, v/vt, v//vn or v/vt/vn, found "x"
 v 0 0 0\nf 1 1 1/a\n => line 2: expected v, v/vt, v//vn or v/vt/vn, found "1/a"
-v 0 0 0\n\nf 1 0 1\n => line 3: face 0 names the vertex 0 of 1 vertex
-v 0 0 0\nf 1 -2 1\n => line 2: face 0 names the vertex -2 of 1 vertex
-v 0 0 0\nf 1 1 1\nf 1 2 1\n => line 3: face 1 names the vertex 2 of 1 vertex
-v 0 0 0\nf 1 -9223372036854775808 1\n => line 2: face 0 names the vertex -9223372036854775808 of 1 vertex
-v 0 0 0\nf 1 1\n => line 2: face 0 has 2 corners; three are the least"#;
+v 0 0 0\n\nf 1 0 1\n => line 3: face 0 refers to vertex 0, but there is 1 vertex
+v 0 0 0\nf 1 -2 1\n => line 2: face 0 refers to vertex -2, but there is 1 vertex
+v 0 0 0\nf 1 1 1\nf 1 2 1\n => line 3: face 1 refers to vertex 2, but there is 1 vertex
+v 0 0 0\nf 1 -9223372036854775808 1\n => line 2: face 0 refers to vertex -9223372036854775808, but there is 1 vertex
+v 0 0 0\nf 1 1\n => line 2: face 0 has 2 corners; at least 3 are needed"#;
 
     /// Replacements in [`PLY`] with the beginnings of their errors.
     const PLY_ERRORS: &str = r#"ply => pyl => line 1: expected a PLY header, found
@@ -312,14 +312,14 @@ element face 1 => element face x => line 7: expected a PLY header, found
 element face 1\nproperty list uchar int vertex_indices\n =>  => no face among 3 vertices; a closed surface is needed, not a point set
 element face => element tristrips => PLY triangle strips are not read;
 1 0 0\n => 1 0\n => line 11: expected vertex 1, found
-3 0 1 2 => 3 0 1 3 => line 13: face 0 names the vertex 3 of 3 vertices
+3 0 1 2 => 3 0 1 3 => line 13: face 0 refers to vertex 3, but there are 3 vertices
 3 0 1 2 => 3 0 1 -1 => line 13: expected face 0, found
 3 0 1 2 => 3 0 1 1.5 => line 13: expected face 0, found
-3 0 1 2 => 2 0 1 => line 13: face 0 has 2 corners; three are the least
+3 0 1 2 => 2 0 1 => line 13: face 0 has 2 corners; at least 3 are needed
 3 0 1 2 => -1 0 1 => line 13: expected face 0, found
 0 0.1 0\n => 0 nan 0\n => line 12: vertex 2 has the coordinate NaN, which is not finite
 1 0 0\n => 1 0 0..\n => line 11: expected vertex 1, found "0.."
-3 0 1 2\n =>  => end of file: expected face 0, found nothing more
+3 0 1 2\n =>  => the file ends before face 0
 vertex 3 => vertex 99 => the header announces 99 vertices, but the file holds only 28"#;
 
     #[test]
@@ -343,7 +343,7 @@ vertex 3 => vertex 99 => the header announces 99 vertices, but the file holds on
         }
         let open = format!("solid\n{}endsolid", FACET.replace(" endloop", " vertex 0 0 0"));
         for (text, expected) in [
-            ("solid x\n", "end of file: expected facet or endsolid, found nothing more"),
+            ("solid x\n", "the file ends before facet or endsolid"),
             (&format!("solid\n{}", &FACET[..60]), "line 5: expected vertex, found \"vert\""),
             (&open, "line 7: expected endloop, found \"vertex\""),
             ("PK", "line 1: expected the word solid or a binary header of 84 bytes, found \"PK\""),

@@ -81,7 +81,7 @@ fn mended(inspection: Inspection, options: MendOptions) -> Result<Loaded, Surfac
     if options == MendOptions::default() {
         return inspection.solid();
     }
-    let Inspection { mesh, report, refused, resolved, .. } = inspection;
+    let Inspection { mesh, report, refused, resolved, file_vertex, .. } = inspection;
     // What was resolved is closed, and what users of the other verbs see.
     let (Loaded { mut mesh, report }, refused) = match resolved {
         Some(solid) => (*solid, None),
@@ -94,7 +94,7 @@ fn mended(inspection: Inspection, options: MendOptions) -> Result<Loaded, Surfac
         let TriMesh { vertices, faces } = &mut mesh;
         // The loops of holes pass a vertex once only if its fans are separate.
         repairs.extend(separate(vertices, faces, Stays::Flattest));
-        repairs.extend(fill(vertices, faces)?);
+        repairs.extend(fill(vertices, faces, &file_vertex)?);
     }
     // After holes are filled: an open component bounds no cavity, and has none.
     repairs.extend(keep(&mut mesh, options.components)?);
@@ -180,21 +180,26 @@ const MAX_EDGES: usize = 500;
 /// # Errors
 /// When a loop is too long, meets itself, or has no triangulation with new edges alone. Then nothing
 /// is changed.
-pub(super) fn fill(vertices: &[Vec3], faces: &mut Vec<[u32; 3]>) -> Result<Vec<Repair>, Fault> {
+fn fill(
+    vertices: &[Vec3],
+    faces: &mut Vec<[u32; 3]>,
+    file_vertex: &[u32],
+) -> Result<Vec<Repair>, Fault> {
+    let named = |vertex| named(vertices, file_vertex, vertex);
     // Found before any hole is filled: new triangles must not change the loops of other holes.
     let rim = Rim::new(faces);
     let mut repairs = Vec::new();
     let mut added: Vec<[u32; 3]> = Vec::new();
     // Grows with each patch, so that two patches never share a chord.
     let mut edges = rim.edges;
-    for corners in loops(vertices, &rim.next)? {
-        let first = named(vertices, corners[0]);
+    for corners in loops(&rim.next).map_err(|vertex| Fault::TangledHole { at: named(vertex) })? {
+        let first = named(corners[0]);
         if corners.len() > MAX_EDGES {
             let (edges, most) = (corners.len(), MAX_EDGES);
             return Err(Fault::LongHole { edges, most, first });
         }
         let patch = Patch::new(vertices, faces, &rim.face_at, &corners, &edges).triangles();
-        let patch = patch.ok_or(Fault::TangledHole { first })?;
+        let patch = patch.ok_or(Fault::BlockedHole { first })?;
         for &[a, b, c] in &patch {
             edges.extend(sides(&[a, b, c]).map(ascending));
         }
@@ -213,8 +218,13 @@ fn ascending([a, b]: [u32; 2]) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
-fn named(vertices: &[Vec3], vertex: u32) -> VertexName {
-    VertexName { index: vertex as usize, position: vertices[vertex as usize] }
+/// The vertex by its number in the file. One that was added to separate parts has that of the nearest vertex.
+fn named(vertices: &[Vec3], file_vertex: &[u32], vertex: u32) -> VertexName {
+    let position = vertices[vertex as usize];
+    let distance = |&vertex: &usize| (vertices[vertex] - position).length();
+    let nearest = (0..file_vertex.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    let index = nearest.map_or(vertex, |nearest| file_vertex[nearest]) as usize;
+    VertexName { index, position }
 }
 
 /// The edges with one face.
@@ -245,7 +255,10 @@ impl Rim {
 }
 
 /// Step 1: the loops, each from its lowest vertex, in the order of these.
-fn loops(vertices: &[Vec3], next: &HashMap<u32, Vec<u32>>) -> Result<Vec<Vec<u32>>, Fault> {
+///
+/// # Errors
+/// The vertex where several loops meet.
+fn loops(next: &HashMap<u32, Vec<u32>>) -> Result<Vec<Vec<u32>>, u32> {
     let mut starts: Vec<u32> = next.keys().copied().collect();
     starts.sort_unstable();
     let mut seen = HashSet::new();
@@ -257,15 +270,14 @@ fn loops(vertices: &[Vec3], next: &HashMap<u32, Vec<u32>>) -> Result<Vec<Vec<u32
         let mut corners = vec![start];
         loop {
             let last = corners[corners.len() - 1];
-            let tangled = Err(Fault::TangledHole { first: named(vertices, last) });
             let &[after] = next.get(&last).map_or(&[][..], Vec::as_slice) else {
-                return tangled;
+                return Err(last);
             };
             if after == start {
                 break;
             }
             if !seen.insert(after) {
-                return tangled;
+                return Err(last);
             }
             corners.push(after);
         }

@@ -77,6 +77,8 @@ pub struct Inspection {
     pub resolved: Option<Box<Loaded>>,
     /// Name of the file in errors.
     file: Option<PathBuf>,
+    /// Number of each vertex of `mesh` in the file.
+    file_vertex: Vec<u32>,
 }
 
 impl Inspection {

@@ -271,8 +271,7 @@ fn fault(at: Place, expected: &str, error: &ParseError) -> Fault {
     const MOST: usize = 80;
     let text = error.to_string();
     if text.ends_with("failed to fill whole buffer") {
-        let (expected, found) = (expected.to_owned(), "nothing more".to_owned());
-        return Fault::Syntax { at: Place::End, expected, found };
+        return Fault::Ends { expected: expected.to_owned() };
     }
     let text = text.split_once(": ").filter(|_| text.starts_with("Line ")).map_or(&*text, |t| t.1);
     let parts: Vec<&str> = text.splitn(3, "\n\t").take(2).map(str::trim).collect();

@@ -49,8 +49,6 @@ pub enum Place {
     Line(usize),
     /// Element of a binary file, counted from 0, such as `vertex 17`.
     Element(&'static str, usize),
-    /// The end of the file.
-    End,
 }
 
 impl fmt::Display for Place {
@@ -58,7 +56,6 @@ impl fmt::Display for Place {
         match self {
             Self::Line(line) => write!(f, "line {line}"),
             Self::Element(kind, index) => write!(f, "{kind} {index}"),
-            Self::End => write!(f, "end of file"),
         }
     }
 }
@@ -70,6 +67,12 @@ fn before(at: &Place) -> String {
         Place::Element(..) => String::new(),
         place => format!("{place}: "),
     }
+}
+
+/// The number of vertices as a clause.
+fn existing(vertices: usize) -> String {
+    let verb = if vertices == 1 { "is" } else { "are" };
+    format!("there {verb} {}", counted(vertices, "vertex"))
 }
 
 /// A vertex as the user can find it: by number and by position.
@@ -104,6 +107,9 @@ pub enum Fault {
     /// Something else is in a place where the format demands a certain thing.
     #[error("{at}: expected {expected}, found {found}")]
     Syntax { at: Place, expected: String, found: String },
+    /// The file ends too early.
+    #[error("the file ends before {expected}")]
+    Ends { expected: String },
     /// The header announces more than the file holds, or less.
     #[error("the header announces {announced} {what}, but the file holds {holds}")]
     Count { what: &'static str, announced: u64, holds: String },
@@ -111,10 +117,10 @@ pub enum Fault {
     #[error("{}vertex {vertex} has the coordinate {value}, which is not finite", before(.at))]
     Coordinate { at: Place, vertex: usize, value: f64 },
     /// A face names a vertex that does not exist.
-    #[error("{}face {face} names the vertex {index} of {}", before(.at), counted(*.vertices, "vertex"))]
+    #[error("{}face {face} refers to vertex {index}, but {}", before(.at), existing(*.vertices))]
     Index { at: Place, face: usize, index: i64, vertices: usize },
     /// A face with fewer than three corners.
-    #[error("{}face {face} has {}; three are the least", before(.at), counted(*.corners, "corner"))]
+    #[error("{}face {face} has {}; at least 3 are needed", before(.at), counted(*.corners, "corner"))]
     TooFewCorners { at: Place, face: usize, corners: usize },
     /// A polygon so intricate that cutting it into triangles takes too long.
     #[error(
@@ -150,16 +156,19 @@ pub enum Fault {
     Open { edges: usize, first: [VertexName; 2] },
     /// A hole that is too long to be filled.
     #[error(
-        "the hole at {first}: too long to fill (found {edges} edges, expected at most {most}); \
-             wrap the surface (`medial repair --wrap`)"
+        "the hole at {first} has {edges} edges, too many to fill (at most {most}); wrap the surface \
+         (`medial repair --wrap`)"
     )]
     LongHole { edges: usize, most: usize, first: VertexName },
-    /// A hole that no triangles close.
+    /// Holes whose boundaries cannot be told apart.
+    #[error("several holes meet at {at}; wrap the surface (`medial repair --wrap`)")]
+    TangledHole { at: VertexName },
+    /// A hole whose triangles would have an edge that has two faces already.
     #[error(
-        "the hole at {first} meets itself or an inner wall, or only edges that are there already \
-         would close it; wrap the surface (`medial repair --wrap`)"
+        "the hole at {first} cannot be filled without a third face at an edge; wrap the surface \
+         (`medial repair --wrap`)"
     )]
-    TangledHole { first: VertexName },
+    BlockedHole { first: VertexName },
     /// Edges with more than two faces.
     #[error(
         "the surface is not manifold: {} with more than two faces, the first ({faces} faces) \

@@ -156,15 +156,16 @@ impl<'a> Cursor<'a> {
 
     /// A fault: another text, or none, in place of the expected one.
     pub fn expected(&self, expected: impl fmt::Display, found: Option<Token<'_>>) -> Fault {
+        let expected = expected.to_string();
         let (at, found) = match found {
             Some(token) => {
                 let advice = if token.is_decimal_comma() { ", a decimal comma" } else { "" };
                 (Place::Line(token.line), quote(token.text) + advice)
             }
-            None if self.at >= self.bytes.len() => (Place::End, "nothing more".to_owned()),
+            None if self.at >= self.bytes.len() => return Fault::Ends { expected },
             None => (Place::Line(self.line), "the end of the line".to_owned()),
         };
-        Fault::Syntax { at, expected: expected.to_string(), found }
+        Fault::Syntax { at, expected, found }
     }
 
     // Expectations are formatted for faults alone: millions of numbers are as expected.

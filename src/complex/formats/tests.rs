@@ -397,7 +397,7 @@ fn errors_name_the_line_and_the_reason() {
         ("3 0 1 2", "4 0 1 2 2", ": line 18: faces must be triangles, found 4 corners"),
         ("3 0 1 2", "3 0 1 3", ": line 18: 3 is not one of the 3 spheres"),
         ("1 0\n3", "1 0.5\n3", ": line 17: 0.5 is not one of the 3 spheres"),
-        ("3 0 1 2", "", ": end of file: expected face 0, found nothing more"),
+        ("3 0 1 2", "", ": the file ends before face 0"),
     ] {
         refuses(parse_ply, default, &[(&valid.replacen(from, to, 1), expected)]);
     }

@@ -95,7 +95,14 @@ fn wrapped(bytes: &[u8], format: Format, options: WrapOptions) -> Result<Inspect
     repairs.push(Repair::Wrapped { triangles, points, alpha, offset, farthest });
     report.repairs = repairs;
     report.warnings.splice(0..0, warnings);
-    Ok(Inspection { mesh, report, refused: None, resolved: None, file: None })
+    Ok(Inspection {
+        mesh,
+        report,
+        refused: None,
+        resolved: None,
+        file: None,
+        file_vertex: Vec::new(),
+    })
 }
 
 /// The first triangle that is not strictly inside of a closed surface: it has a corner that is not, or meets a face.
