@@ -7,7 +7,7 @@ use medial_run::level::Target;
 use medial_run::record::{Record, Status, is_near};
 use medial_run::text::{counted, grouped, printable, trimmed};
 
-use crate::metric::{COMPARED, FROZEN_SECONDS, HAUSDORFF, Metric};
+use crate::metric::{COMPARED, FROZEN_SECONDS, HAUSDORFF, Metric, TIME_SPREAD};
 
 /// Every record that counts, by mesh, series and level.
 pub(crate) struct Comparison<'a> {
@@ -207,10 +207,13 @@ impl<'a> Comparison<'a> {
         Some(note)
     }
 
-    /// The columns of tables: [`COMPARED`], with the seconds of an edition if it has rows.
+    /// The columns of tables: [`COMPARED`], with the spread of repeated times and the seconds of an edition if there are any.
     pub(crate) fn columns(&self) -> Vec<&'static Metric> {
         let frozen = self.entries.iter().any(|entry| entry.record.edition.is_some());
-        COMPARED.into_iter().chain(frozen.then_some(&FROZEN_SECONDS)).collect()
+        let spread = self.entries.iter().any(|entry| TIME_SPREAD.of(entry.record).is_some());
+        let times = [(spread, &TIME_SPREAD), (frozen, &FROZEN_SECONDS)];
+        let times = times.into_iter().filter_map(|(is_shown, metric)| is_shown.then_some(metric));
+        COMPARED.into_iter().chain(times).collect()
     }
 
     /// Warnings on comparing these records.

@@ -410,6 +410,22 @@ pub(crate) const FROZEN_SECONDS: Metric = Metric::new(
 )
 .neutral();
 
+/// In the tables of results that were timed several times, next to [`TOTAL_SECONDS`].
+pub(crate) const TIME_SPREAD: Metric = Metric::new(
+    "seconds_spread",
+    "spread of times",
+    "%",
+    (Better::Lower, Digits::Tenths, Mean::Arithmetic),
+    Value::Record(|record| {
+        let median = record.seconds().filter(|_| record.repetitions.len() > 1)?.total;
+        let totals = || record.repetitions.iter().map(|repetition| repetition.seconds.total);
+        let ends = [totals().reduce(f64::min)?, totals().reduce(f64::max)?];
+        (median > 0.0).then(|| (ends[1] - ends[0]) / median)
+    }),
+)
+.defined("The longest minus the shortest time over the repetitions, in % of their median.")
+.neutral();
+
 /// The columns of the comparison tables.
 pub(crate) const COMPARED: [&Metric; 8] = [
     &HAUSDORFF,
@@ -502,7 +518,7 @@ pub const METRICS: &[Metric] = &[
 /// The groups of metrics that `medial evaluate` prints by default, each with its keys.
 pub const BRIEF: [(&str, &[&str]); 3] = [
     (
-        "error, in % of the diagonal",
+        "error, in % of the diagonal and in the unit of the mesh",
         &[
             "hausdorff",
             "certified_lower",
@@ -526,6 +542,8 @@ pub struct MeasuredRow {
     pub title: String,
     /// A text for each mesh, `-` where it was not measured.
     pub cells: Vec<String>,
+    /// The length for each mesh as a fraction of the diagonal, where the metric is one.
+    pub lengths: Vec<Option<f64>>,
 }
 
 /// Every metric that was measured on at least one of some medial meshes.
@@ -535,12 +553,15 @@ pub fn measured_rows(evaluations: &[&Evaluation]) -> Vec<MeasuredRow> {
         let Value::Evaluation(value) = metric.value else { continue };
         let found: Vec<Option<f64>> = evaluations.iter().map(|e| value(e)).collect();
         if found.iter().any(Option::is_some) {
+            // Shares have a longer unit.
+            let is_length = metric.unit == "%";
+            let lengths = found.iter().map(|value| value.filter(|_| is_length)).collect();
             let cells = (found.into_iter())
                 .map(|value| value.map(|value| metric.format(metric.times * value)))
                 .map(|text| text.unwrap_or_else(|| "-".to_owned()))
                 .collect();
             let title = format!("{}{}", metric.title, metric.unit_suffix());
-            rows.push(MeasuredRow { key: metric.key, title, cells });
+            rows.push(MeasuredRow { key: metric.key, title, cells, lengths });
         }
     }
     rows

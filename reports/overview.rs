@@ -8,7 +8,9 @@ use medial_run::text::{aligned, counted, grouped, printable, shortened};
 use crate::answers::{equal_error_table, usual_level};
 use crate::comparison::{Comparison, reached, row_name};
 use crate::header::MethodNote;
-use crate::metric::{FROZEN_SECONDS, HAUSDORFF, MEAN_ERROR, Mean, Metric, TOTAL_SECONDS};
+use crate::metric::{
+    FROZEN_SECONDS, HAUSDORFF, MEAN_ERROR, Mean, Metric, TIME_SPREAD, TOTAL_SECONDS,
+};
 use crate::summary::{CountSummary, SeriesSummary, by_count};
 use crate::tables::{Cell, Table};
 
@@ -58,6 +60,7 @@ pub(crate) fn overview_table(
         .text("topology", |row| Cell::share(row.topology))
         .number("means over", |row| Cell::share((row.over, row.requested)))
         .number("seconds", |row| mean(row, &TOTAL_SECONDS))
+        .number("spread %", |row| mean(row, &TIME_SPREAD))
         .number("frozen s", |row| mean(row, &FROZEN_SECONDS))
         .text("best suited for", |row| {
             let note = methods.iter().find(|note| note.id == comparison.methods[row.series]);
@@ -72,7 +75,16 @@ pub(crate) fn overview_table(
         notes.push("In parentheses: means over fewer meshes, which do not compare.".to_owned());
     }
     let edition = comparison.edition_note();
-    let table = if edition.is_some() { table } else { table.without(&["frozen s"]) };
+    let has = |metric: &Metric| comparison.columns().iter().any(|column| column.key == metric.key);
+    let times = [("spread %", TIME_SPREAD), ("frozen s", FROZEN_SECONDS)];
+    let missing_times = times.iter().filter(|(_, metric)| !has(metric)).map(|(title, _)| *title);
+    let table = table.without(&missing_times.collect::<Vec<_>>());
+    if has(&TIME_SPREAD) {
+        notes.push(
+            "Spread: the longest minus the shortest time over the repetitions, in % of the median."
+                .to_owned(),
+        );
+    }
     let missing: Vec<String> =
         missing.iter().map(|(why, names)| format!("{} ({why})", names.join(", "))).collect();
     if !missing.is_empty() {

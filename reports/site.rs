@@ -163,7 +163,7 @@ impl Site<'_> {
                 metric.of(entry.record).map(|value| metric.format(value))
             });
         }
-        let rows = rows.text("as solid", |entry| topology_word(entry));
+        let rows = rows.text("right topology", |entry| topology_word(entry));
         Table { caption: "Results at requested numbers of spheres".to_owned(), ..rows.table }
     }
 

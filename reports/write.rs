@@ -67,7 +67,7 @@ pub fn write_report(
     let [structure, cover] = topic_tables(&comparison, &how).map(Vec::from_iter);
     let differences = if is_one { vec![] } else { difference_tables(&comparison, &how) };
     for (stem, title, tables) in [
-        ("overview-purpose", "Which method?", &answers),
+        ("overview-purpose", "Methods by criterion", &answers),
         ("overview-structure", "Structure", &structure),
         ("overview-cover", "Cover", &cover),
         ("overview-differences", "Differences between methods", &differences),

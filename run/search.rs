@@ -318,7 +318,7 @@ impl Found {
         let best = self.best.map_or_else(String::new, |Probe { level, spheres, error }| {
             let at = match level {
                 Level::Spheres(requested) if requested == spheres => format!("at {level}"),
-                _ => format!("with {spheres} spheres (requested: {level})"),
+                _ => format!("with {spheres} spheres (level {level})"),
             };
             format!(": the lowest error is {} {at}", percent(error))
         });

@@ -83,7 +83,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         let row = rows.remove(0)?;
         row.notes.iter().for_each(|line| note(global, line));
         let warnings = [&row.defects[..], warnings].concat();
-        let text = described(&row.evaluation, arguments.is_complete());
+        let text =
+            described(&row.evaluation, shape.normalisation().diagonal, arguments.is_complete());
         let all = [&row.evaluation.warnings[..], &warnings].concat();
         return Ok(print_result(global, &row, &text, &all));
     }
@@ -203,8 +204,8 @@ fn print_table(
     warnings.iter().for_each(|warning| print_line(&format!("warning: {warning}")));
 }
 
-/// Some metrics in groups, or `all`, lengths in percent of the diagonal.
-fn described(evaluation: &Evaluation, all: bool) -> String {
+/// Some metrics in groups, or `all`, lengths in percent of the diagonal and in the unit of the mesh.
+fn described(evaluation: &Evaluation, diagonal: f64, all: bool) -> String {
     let counts = &evaluation.counts;
     let mut text = format!(
         "{}, {} ({} without a face), {}",
@@ -228,20 +229,25 @@ fn described(evaluation: &Evaluation, all: bool) -> String {
         format!("on the {on}: {x} {y} {z}")
     });
     let rows = measured_rows(&[evaluation]);
+    let cells = |row: &MeasuredRow| match row.lengths[0] {
+        Some(length) => format!("{:<10} {}", row.cells[0], significant(length * diagonal, 4)),
+        None => row.cells[0].clone(),
+    };
     if !all {
         text += &line("Betti numbers", &betti);
         for (group, keys) in BRIEF {
             text += &format!("\n  {group}");
             let shown = rows.iter().filter(|row| keys.contains(&row.key));
-            shown.for_each(|row| text += &line(&format!("  {}", row.title), &row.cells[0]));
+            shown.for_each(|row| text += &line(&format!("  {}", row.title), &cells(row)));
         }
         if let Some(witness) = witness {
             text += &line("farthest point", &witness);
         }
         return text + "\n  all metrics: --all";
     }
+    text += "\n  lengths: in % of the diagonal, and in the unit of the mesh";
     let mut add = |name: &str, value: &str| text += &line(name, value);
-    rows.iter().for_each(|row| add(&row.title, &row.cells[0]));
+    rows.iter().for_each(|row| add(&row.title, &cells(row)));
     add("Betti numbers", &betti);
     if let Some(structure) = &evaluation.structure {
         add("structure", &structure.graph.to_string());

@@ -247,7 +247,7 @@ impl Page<'_> {
                     the solid and the shape that the result describes.";
         match own.len() {
             0 => lead.to_owned(),
-            _ => format!("{lead} Not published, of this project: {}.", own.join(", ")),
+            _ => format!("{lead} Methods of this project, not published: {}.", own.join(", ")),
         }
     }
 
@@ -263,7 +263,8 @@ impl Page<'_> {
         let runs = &comparison.entries;
         let missed = runs.iter().filter(|entry| !entry.record.status.is_ok()).count();
         let runs = counted(runs.len(), "run", "runs");
-        let fact = format!("{} of {runs} without the requested result", grouped(missed as u64));
+        let fact =
+            format!("{} of {runs} did not give the requested result", grouped(missed as u64));
         facts.extend((missed > 0).then_some(fact));
         let run = self.header.runs.last();
         facts.extend(run.and_then(|run| run.date.clone()));

@@ -33,7 +33,7 @@ const resultsOf = (bulk) => {
     }),
     number("memory", "memory (MB) ↓", true, "count", 1e-6),
     text("betti", "Betti"),
-    text("topology", "as solid"),
+    text("topology", "right topology"),
     text("remark", "remark"),
   ];
   const betti = columnOf("evaluate/betti");

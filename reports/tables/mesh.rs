@@ -97,7 +97,7 @@ pub(crate) fn mesh_table(comparison: &Comparison<'_>, mesh: usize, how: &str) ->
         let evaluation = entry.record.evaluate.as_ref();
         evaluation.map(|evaluation| betti(Some(evaluation.betti)))
     });
-    rows = rows.text("as solid", topology_word);
+    rows = rows.text("right topology", topology_word);
     rows = rows.text("remark", remark);
     let mut notes = vec![how.to_owned()];
     if let Some(initial) = entries.iter().find_map(|entry| entry.record.initial) {

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use medial_reports::{picture_strips, read_header, summary_text, write_report, write_site};
-use medial_run::record::{Record, Status};
+use medial_run::record::{Record, Repetition, Stages, Status};
 
 use super::common::{SHAPES, comparison, documents, failed, header, ok};
 
@@ -66,6 +66,28 @@ fn the_same_records_give_the_same_bytes() {
     for plot in plots {
         assert!(text(&files, plot).trim_end().ends_with("</svg>"), "{plot} is cut off");
     }
+}
+
+#[test]
+fn repeated_times_have_their_spread_beside_them() {
+    let mut records = comparison(&SHAPES[..1], &METHODS, &COUNTS);
+    assert!(!summary_text(&records, &[]).contains("spread"));
+    for record in &mut records {
+        let median = record.simplify.seconds.unwrap();
+        record.repetitions = [0.9, 1.0, 1.5]
+            .map(|factor| Repetition {
+                seconds: Stages { total: factor * median.total, ..median },
+                cpu_seconds: median,
+            })
+            .to_vec();
+    }
+    let text = summary_text(&records, &[]);
+    let rows: Vec<&str> = text.lines().collect();
+    assert!(rows[1].contains("seconds  spread %"), "{text}");
+    assert!(rows[2..4].iter().all(|row| row.contains("  60.0")), "{text}");
+    let files = report_of(&records);
+    let table = std::str::from_utf8(&files["tables/mesh-bear.md"]).unwrap();
+    assert!(table.contains("spread of times (%)") && table.contains("| 60.0 |"), "{table}");
 }
 
 #[test]
