@@ -18,6 +18,40 @@ fn help_names_every_verb() {
     insta::assert_snapshot!(Folder::new().done("--help"));
 }
 
+/// The options of a verb as rows of Markdown: name and value, the first sentence of the help, the default.
+fn rows_of_options(verb: &clap::Command) -> String {
+    let options = verb.get_arguments().filter(|option| option.get_long().is_some());
+    let row = |option: &clap::Arg| {
+        let takes_value = option.get_action().takes_values();
+        let values = option.get_value_names().filter(|_| takes_value).unwrap_or_default();
+        let name = [
+            &[format!("--{}", option.get_long().unwrap())],
+            &*values.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        ]
+        .concat()
+        .join(" ");
+        let help = option.get_help().unwrap().to_string().replace('|', "\\|");
+        let defaults = option.get_default_values().iter().map(|value| value.to_string_lossy());
+        let default: Vec<_> = defaults.collect();
+        let shown = if default.is_empty() || !takes_value {
+            String::new()
+        } else {
+            format!(" [default: {}]", default.join(", "))
+        };
+        format!("| `{name}` | {help}{shown} |\n")
+    };
+    options.map(row).collect()
+}
+
+#[test]
+fn the_guide_has_every_option_of_compare() {
+    let command = medial_bench::cli::command();
+    let rows = rows_of_options(command.find_subcommand("compare").unwrap());
+    let guide = include_str!("../../../docs/runner.md");
+    assert!(rows.lines().count() > 25, "{rows}");
+    assert!(guide.contains(&rows), "docs/runner.md needs these rows:\n{rows}");
+}
+
 #[test]
 fn every_help_ends_with_examples_that_parse() {
     let command = medial_bench::cli::command();
