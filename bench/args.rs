@@ -50,7 +50,7 @@ impl Global {
 #[derive(Clone, Debug, Args)]
 pub struct SubstrateArguments {
     /// Boundary samples: `conforming` (the vertices, with points that make the topology right), `vertices`
-    /// (as in the papers), `uniform:COUNT` or `blue:COUNT`; `conforming:COUNT` begins with so many at least
+    /// (as in the papers), `uniform:COUNT`, `blue:COUNT`, or `conforming:COUNT`, which begins with COUNT points at least
     /// [default: conforming].
     #[arg(long, value_name = "SAMPLING")]
     pub sampling: Option<String>,

@@ -553,7 +553,7 @@ pub fn measured_rows(evaluations: &[&Evaluation]) -> Vec<MeasuredRow> {
         let Value::Evaluation(value) = metric.value else { continue };
         let found: Vec<Option<f64>> = evaluations.iter().map(|e| value(e)).collect();
         if found.iter().any(Option::is_some) {
-            // Shares have a longer unit.
+            // `%` alone is of the diagonal: units of shares are longer.
             let is_length = metric.unit == "%";
             let lengths = found.iter().map(|value| value.filter(|_| is_length)).collect();
             let cells = (found.into_iter())

@@ -274,7 +274,7 @@ fn more_spheres_are_not_worse_where_the_axis_is_a_point() {
     let has = |found: &Simplified, count: &str| {
         found.diagnostics.counts.iter().any(|(name, _)| name == count)
     };
-    // The larger number has no run of its own.
+    // With more spheres there are no swaps: the result of few is continued.
     let own_and_grown =
         |found| ["swaps_that_helped", "grown_from_spheres"].map(|count| has(found, count));
     assert_eq!([&few, &many].map(own_and_grown), [[true, false], [false, true]]);

@@ -90,6 +90,12 @@ fn mended(inspection: Inspection, options: MendOptions) -> Result<Loaded, Surfac
     let mut repairs = report.repairs;
     // The examination of the result repeats its warnings; a failed one has none of the reader.
     let mut warnings = if refused.is_some() { Vec::new() } else { report.warnings };
+    // A loop of a one-sided surface ends where the orientation turns over, and no filling makes it a solid.
+    let is_one_sided = |error: &SurfaceError| matches!(error.fault, Fault::NonOrientable { .. });
+    if let Some(error) = refused.as_ref().filter(|error| options.fill_holes && is_one_sided(error))
+    {
+        return Err(error.clone());
+    }
     if options.fill_holes {
         let TriMesh { vertices, faces } = &mut mesh;
         // The loops of holes pass a vertex once only if its fans are separate.
@@ -192,7 +198,7 @@ fn fill(
     let mut added: Vec<[u32; 3]> = Vec::new();
     // Grows with each patch, so that two patches never share a chord.
     let mut edges = rim.edges;
-    for corners in loops(&rim.next).map_err(|vertex| Fault::TangledHole { at: named(vertex) })? {
+    for corners in loops(&rim.next).map_err(|vertex| Fault::BranchingHole { at: named(vertex) })? {
         let first = named(corners[0]);
         if corners.len() > MAX_EDGES {
             let (edges, most) = (corners.len(), MAX_EDGES);
@@ -257,7 +263,7 @@ impl Rim {
 /// Step 1: the loops, each from its lowest vertex, in the order of these.
 ///
 /// # Errors
-/// The vertex where several loops meet.
+/// The vertex where edges branch.
 fn loops(next: &HashMap<u32, Vec<u32>>) -> Result<Vec<Vec<u32>>, u32> {
     let mut starts: Vec<u32> = next.keys().copied().collect();
     starts.sort_unstable();

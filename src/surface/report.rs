@@ -160,12 +160,12 @@ pub enum Fault {
          (`medial repair --wrap`)"
     )]
     LongHole { edges: usize, most: usize, first: VertexName },
-    /// Holes whose boundaries cannot be told apart.
-    #[error("several holes meet at {at}; wrap the surface (`medial repair --wrap`)")]
-    TangledHole { at: VertexName },
-    /// A hole whose triangles would have an edge that has two faces already.
+    /// A hole whose edges are no loop.
+    #[error("the edges of a hole branch at {at}; wrap the surface (`medial repair --wrap`)")]
+    BranchingHole { at: VertexName },
+    /// A hole whose triangles would have an edge with two faces.
     #[error(
-        "the hole at {first} cannot be filled without a third face at an edge; wrap the surface \
+        "the hole at {first} cannot be filled: an edge would have three faces; wrap the surface \
          (`medial repair --wrap`)"
     )]
     BlockedHole { first: VertexName },

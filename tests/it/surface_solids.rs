@@ -896,11 +896,43 @@ fn every_hole_is_reported_and_long_ones_are_refused() {
     let repairs = mend(&two, FILL).expect("closed").report.repairs;
     let holes = repairs.iter().filter(|repair| matches!(repair, Repair::FilledHole { .. }));
     assert_eq!(holes.count(), 2);
-    let lid = lattice_box(126, |p| p.z == 1.0);
+    // The reader drops the first vertices, which belong to no face.
+    let mut lid = lattice_box(126, |p| p.z == 1.0);
+    lid.vertices.splice(0..0, [Vec3::ZERO; 3]);
+    lid.faces.iter_mut().flatten().for_each(|vertex| *vertex += 3);
     let fault = mend(&lid, FILL).expect_err("too long").fault;
-    assert!(matches!(fault, Fault::LongHole { edges: 504, most: 500, .. }), "{fault}");
+    let Fault::LongHole { edges: 504, most: 500, first } = fault else { panic!("{fault}") };
+    assert_eq!(lid.vertices[first.index], first.position, "the number in the file");
     let open = mend(&two, MendOptions::default()).expect_err("open").fault;
     assert!(matches!(open, Fault::Open { .. }), "{open}");
+}
+
+#[test]
+fn holes_of_no_solid_have_the_reason() {
+    // A band with half a turn.
+    let corner = |i: u32| [2 * (i % 8), 2 * (i % 8) + 1];
+    let place = |k: u32| {
+        let (angle, side) = (f64::from(k / 2) * TAU / 8.0, f64::from(k % 2) - 0.5);
+        let along = 1.0 + 0.3 * side * (angle / 2.0).cos();
+        Vec3::new(along * angle.cos(), along * angle.sin(), 0.3 * side * (angle / 2.0).sin())
+    };
+    let faces = (0..8).flat_map(|i| {
+        let ([a, b], [mut c, mut d]) = (corner(i), corner(i + 1));
+        if i == 7 {
+            (c, d) = (d, c);
+        }
+        [[a, c, d], [a, d, b]]
+    });
+    let band = TriMesh { vertices: (0..16).map(place).collect(), faces: faces.collect() };
+    let fault = mend(&band, FILL).expect_err("one-sided").fault;
+    assert!(matches!(fault, Fault::NonOrientable { .. }), "{fault}");
+    // Three leaves at one edge.
+    let leaf = |k: f64| Vec3::new(k.cos(), k.sin(), 0.5);
+    let vertices = [Vec3::ZERO, Vec3::Z, leaf(0.0), leaf(2.0), leaf(4.0)].to_vec();
+    let book = TriMesh { vertices, faces: vec![[0, 1, 2], [0, 1, 3], [0, 1, 4]] };
+    let fault = mend(&book, FILL).expect_err("three leaves").fault;
+    let Fault::BranchingHole { at } = fault else { panic!("{fault}") };
+    assert_eq!(book.vertices[at.index], at.position);
 }
 
 #[test]

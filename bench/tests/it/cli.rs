@@ -18,29 +18,27 @@ fn help_names_every_verb() {
     insta::assert_snapshot!(Folder::new().done("--help"));
 }
 
-/// The options of a verb as rows of Markdown: name and value, the first sentence of the help, the default.
+/// The options of a verb as rows of Markdown: name and value, help, default.
 fn rows_of_options(verb: &clap::Command) -> String {
-    let options = verb.get_arguments().filter(|option| option.get_long().is_some());
-    let row = |option: &clap::Arg| {
-        let takes_value = option.get_action().takes_values();
-        let values = option.get_value_names().filter(|_| takes_value).unwrap_or_default();
-        let name = [
-            &[format!("--{}", option.get_long().unwrap())],
-            &*values.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        ]
-        .concat()
-        .join(" ");
-        let help = option.get_help().unwrap().to_string().replace('|', "\\|");
-        let defaults = option.get_default_values().iter().map(|value| value.to_string_lossy());
-        let default: Vec<_> = defaults.collect();
-        let shown = if default.is_empty() || !takes_value {
-            String::new()
-        } else {
-            format!(" [default: {}]", default.join(", "))
-        };
-        format!("| `{name}` | {help}{shown} |\n")
-    };
-    options.map(row).collect()
+    let mut rows = String::new();
+    for option in verb.get_arguments() {
+        let Some(name) = option.get_long() else { continue };
+        let mut call = format!("--{name}");
+        let mut help = option.get_help().unwrap().to_string().replace('|', "\\|");
+        if option.get_action().takes_values() {
+            option
+                .get_value_names()
+                .iter()
+                .flat_map(|names| *names)
+                .for_each(|name| call += &format!(" {name}"));
+            option
+                .get_default_values()
+                .iter()
+                .for_each(|value| help += &format!(" [default: {}]", value.display()));
+        }
+        rows += &format!("| `{call}` | {help} |\n");
+    }
+    rows
 }
 
 #[test]

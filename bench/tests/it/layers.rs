@@ -2,6 +2,14 @@
 
 use std::process::Command;
 
+/// A plug-in crate shares compiled crates only with equal settings.
+#[test]
+fn the_example_has_the_profile_of_the_workspace() {
+    let example = include_str!("../../../examples/plugin-crate/.cargo/config.toml");
+    let profile = &example[example.find("[profile.release]").unwrap()..];
+    assert!(include_str!("../../../Cargo.toml").contains(profile), "{profile}");
+}
+
 #[test]
 fn uses_keep_to_their_layers() {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../scripts/layers.py");
