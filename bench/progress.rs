@@ -1,9 +1,11 @@
 //! Progress on standard error: of a list of items, and of the stages of one.
 
+use std::fmt;
 use std::io::{self, IsTerminal, Write};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use medial::simplifier::Progress as Steps;
 use medial_run::text::printable;
 
@@ -17,21 +19,43 @@ pub struct Progress {
     /// Whether only reasons of missing results go to standard error.
     is_quiet: bool,
     begun: usize,
-    total: usize,
+    turns: usize,
+    /// The usual seconds of all turns and of those that are done.
+    total: f64,
+    done: f64,
+    start: Instant,
+    estimate: Arc<Mutex<Option<Estimate>>>,
 }
 
+/// The remaining time, as estimated at an instant.
+type Estimate = (Instant, Duration);
+
+/// Share of the work before which there is no estimate.
+const EARLY: f64 = 0.05;
+
 impl Progress {
-    /// Progress through a number of turns of methods.
-    pub fn new(is_quiet: bool, total: usize) -> Self {
+    /// Progress through turns of methods with these usual seconds, whose ratios give the estimate.
+    pub fn new(is_quiet: bool, seconds: Vec<f64>) -> Self {
+        let (turns, total) = (seconds.len(), seconds.iter().sum());
+        let estimate: Arc<Mutex<Option<Estimate>>> = Arc::default();
         // In a log file a bar would be one long line of control characters.
         let is_drawn = !is_quiet && io::stderr().is_terminal();
-        let bar = is_drawn.then(|| ProgressBar::new(total as u64));
+        let bar = is_drawn.then(|| ProgressBar::new(turns as u64));
         if let Some(bar) = &bar {
-            let line = "{bar:30} {pos}/{len}  {elapsed}, about {eta} left  {msg}";
-            bar.set_style(style(line));
+            let line = style("{bar:30} {pos}/{len}  {elapsed}{left}  {msg}");
+            let shown = Arc::clone(&estimate);
+            // Between two results it falls with the clock.
+            let left = move |_: &ProgressState, line: &mut dyn fmt::Write| {
+                if let Some((at, left)) = *shown.lock().unwrap_or_else(PoisonError::into_inner) {
+                    let left = left.saturating_sub(at.elapsed());
+                    let _ = write!(line, ", about {} left", HumanDuration(left));
+                }
+            };
+            bar.set_style(line.with_key("left", left));
             bar.enable_steady_tick(INTERVAL);
         }
-        Self { bar, is_quiet, begun: 0, total }
+        let start = Instant::now();
+        Self { bar, is_quiet, begun: 0, turns, total, done: 0.0, start, estimate }
     }
 
     /// Shows the current mesh and method, and the number of the repetition among `of`.
@@ -45,14 +69,21 @@ impl Progress {
             }
             // One line for each mesh and method.
             None if turn == 1 && !self.is_quiet => {
-                self.remark(&format!("[{}/{}] {mesh}: {method}", self.begun, self.total));
+                self.remark(&format!("[{}/{}] {mesh}: {method}", self.begun, self.turns));
             }
             None => {}
         }
     }
 
-    /// A turn of a method is done.
-    pub fn done(&self) {
+    /// A turn of a method of these usual seconds is done.
+    pub fn done(&mut self, seconds: f64) {
+        self.done += seconds;
+        let share = self.done / self.total;
+        if share >= EARLY {
+            let left = self.start.elapsed().mul_f64((1.0 - share).max(0.0) / share);
+            let mut estimate = self.estimate.lock().unwrap_or_else(PoisonError::into_inner);
+            *estimate = Some((Instant::now(), left));
+        }
         self.bar.iter().for_each(|bar| bar.inc(1));
     }
 

@@ -15,16 +15,16 @@ use medial_run::text::{file_stems, grouped};
 use crate::answers::usual_level;
 use crate::comparison::{Comparison, Entry, reached};
 use crate::metric::HAUSDORFF;
-use crate::render::{Background, Camera, ColourBy, Errors, Panel, Strip, strip};
+use crate::render::{Background, Camera, ColourBy, Errors, Layout, Panel, Strip, strip};
 use crate::view3d::View3d;
 
 /// Folders of the pictures and of the 3D views, next to the page.
 pub(crate) const FOLDER: &str = "pictures";
 pub(crate) const VIEWS: &str = "views";
 
-/// Pixels of a panel, and panels in a row: a page of usual width shows them at about their size.
-const PANEL: [usize; 2] = [236, 192];
-const ACROSS: usize = 6;
+/// Pixels of a panel, which the page shows in 1.3 to 2 of its own units, and panels in a row of the file.
+const PANEL: [usize; 2] = [320, 260];
+const ACROSS: usize = 4;
 
 /// A strip of pictures that a report shows if it finds it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,7 +52,8 @@ impl PictureStrip {
     /// the numbers of a later one.
     fn name(&mut self, stem: &str) {
         let bytes = self.panels.iter().flat_map(|(artifact, caption)| [artifact, caption]);
-        let bytes = bytes.flat_map(|text| text.bytes().chain([0]));
+        let layout = format!("{PANEL:?} {ACROSS}"); // the page cuts panels out of the file
+        let bytes = bytes.chain([&layout]).flat_map(|text| text.bytes().chain([0]));
         let hash = bytes.fold(0, |hash, byte| splitmix(hash ^ u64::from(byte)));
         self.view = format!("mesh-{stem}-{:08x}", hash >> 32);
         self.file = format!("{FOLDER}/{}.png", self.view);
@@ -89,6 +90,11 @@ impl PictureStrip {
         };
         let png = strip(&panels, &common).and_then(|picture| picture.to_png());
         Ok((png.map_err(|error| error.to_string())?, view.script(&self.view)))
+    }
+
+    /// Where the panels are in the picture.
+    pub(crate) fn layout(&self) -> Layout {
+        Layout::of(self.panels.len(), ACROSS, PANEL)
     }
 
     /// Path of the 3D view, relative to the folder of the report.

@@ -3,6 +3,7 @@
 //! The further pages have no script. Everything is in one folder, with relative links, so it opens from disk and from any
 //! static host.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -13,7 +14,8 @@ use medial_run::text::{escape_html, file_stems, grouped};
 use crate::comparison::{Comparison, Entry, reached};
 use crate::header::{Header, MethodNote, method_pages};
 use crate::metric::{HAUSDORFF, MEAN_ERROR, MIN_ANGLE, TOTAL_SECONDS};
-use crate::pictures::strips;
+use crate::pictures::{PictureStrip, strips};
+use crate::render::Layout;
 use crate::tables::{Table, mesh_table, to_html, topology_word};
 use crate::write::{Files, write_report};
 
@@ -44,15 +46,17 @@ pub fn write_site(
         comparison: &comparison,
         header: &header,
         stems: file_stems(comparison.meshes.iter().map(String::as_str)),
+        pictures: pictures
+            .into_iter()
+            .filter(|(_, strip)| dir.join(&strip.file).is_file())
+            .collect(),
+        written: report.iter().filter_map(|path| path.strip_prefix(dir).ok()).collect(),
     };
     for (note, page) in method_pages(&header, &comparison) {
         files.write(&page, site.method_page(note).as_bytes())?;
     }
     for (mesh, stem) in site.stems.iter().enumerate() {
-        let picture = pictures.get(&mesh).map(|strip| strip.file.as_str());
-        let picture = picture.filter(|file| dir.join(file).is_file());
-        let page = site.mesh_page(mesh, picture, |file| report.contains(&dir.join(file)));
-        files.write(&mesh_file(stem), page.as_bytes())?;
+        files.write(&mesh_file(stem), site.mesh_page(mesh).as_bytes())?;
     }
     Ok([report, files.written].concat())
 }
@@ -69,6 +73,10 @@ struct Site<'a> {
     header: &'a Header,
     /// Names of the files of each mesh.
     stems: Vec<String>,
+    /// The pictures that are in the folder, by mesh.
+    pictures: BTreeMap<usize, PictureStrip>,
+    /// The files of the report, relative to the folder.
+    written: Vec<&'a Path>,
 }
 
 impl Site<'_> {
@@ -115,7 +123,9 @@ impl Site<'_> {
                 body += &format!("<h2>{}</h2>\n", escape_html(&comparison.series[series]));
             }
             body += &to_html(&self.results(series), &link);
+            body += &self.panels(series);
         }
+        body += &self.plots("overview");
         if !note.params.is_empty() {
             let rows = Table::of(&note.params)
                 .text("parameter", |param| param.name.to_string())
@@ -158,6 +168,12 @@ impl Site<'_> {
             .number("requested", |entry| entry.record.simplify.level.to_string())
             .number("spheres", |entry| reached(entry.record).map(|n| grouped(n as u64)))
             .text("rank by Hausdorff", |entry| rank(entry));
+        let claimed = |entry: &&Entry<'_>| entry.record.simplify.own_seconds?.simplify;
+        if entries.iter().any(|entry| claimed(&entry).is_some()) {
+            rows = rows.number("claimed time (s)", |entry| {
+                claimed(&entry).map(|seconds| TOTAL_SECONDS.format(seconds))
+            });
+        }
         for metric in [&HAUSDORFF, &MEAN_ERROR, &MIN_ANGLE, &TOTAL_SECONDS] {
             rows = rows.number(metric.heading(), |entry| {
                 metric.of(entry.record).map(|value| metric.format(value))
@@ -167,15 +183,55 @@ impl Site<'_> {
         Table { caption: "Results at requested numbers of spheres".to_owned(), ..rows.table }
     }
 
-    fn mesh_page(
-        &self,
-        mesh: usize,
-        picture: Option<&str>,
-        is_here: impl Fn(&str) -> bool,
-    ) -> String {
+    /// The medial mesh and the errors of a series on each mesh that has a picture of them.
+    fn panels(&self, series: usize) -> String {
+        let mut panels = String::new();
+        for (mesh, strip) in &self.pictures {
+            let own = |artifact: &String| {
+                let mut entries = self.comparison.of_mesh(*mesh).filter(|e| e.series == series);
+                entries.any(|entry| entry.record.artifact.as_ref() == Some(artifact))
+            };
+            let Some(place) = strip.panels.iter().position(|(artifact, _)| own(artifact)) else {
+                continue; // no result at the count of the pictures
+            };
+            let Layout { whole: [width, height], panel: [across, down], axes, errors, .. } =
+                strip.layout();
+            panels += "<figure class=\"panel\">\n";
+            for [x, y] in [axes[place], errors[place]] {
+                panels += &format!(
+                    "<svg viewBox=\"{x} {y} {across} {down}\" role=\"img\"><image href=\"{}\" \
+                     width=\"{width}\" height=\"{height}\"/></svg>\n",
+                    strip.file
+                );
+            }
+            let mesh = escape_html(&self.comparison.meshes[*mesh]);
+            let caption = escape_html(&strip.panels[place].1);
+            panels += &format!("<figcaption>{mesh}, {caption}</figcaption>\n</figure>\n");
+        }
+        if panels.is_empty() {
+            return panels;
+        }
+        format!(
+            "<div class=\"panels\">\n{panels}</div>\n<p class=\"note\">Above the medial mesh; below it the surface: red \
+             where the reconstruction reaches beyond it, blue where it falls short.</p>\n"
+        )
+    }
+
+    /// The leading plots that the report has of a mesh or of the means.
+    fn plots(&self, stem: &str) -> String {
+        let kinds = ["hausdorff", "time"];
+        let files = kinds.map(|kind| (kind, format!("plots/{stem}-{kind}.svg")));
+        let here = files.iter().filter(|(_, file)| self.written.contains(&Path::new(file)));
+        here.map(|(kind, file)| {
+            format!("<img src=\"{file}\" alt=\"{kind}\" style=\"max-width:min(100%,44rem)\">\n")
+        })
+        .collect()
+    }
+
+    fn mesh_page(&self, mesh: usize) -> String {
         let (name, stem) = (&self.comparison.meshes[mesh], &self.stems[mesh]);
         let mut body = String::new();
-        if let Some(file) = picture {
+        if let Some(PictureStrip { file, .. }) = self.pictures.get(&mesh) {
             let words = "medial meshes and errors of all methods, the least Hausdorff error first";
             body += &format!(
                 "<p><img src=\"{file}\" alt=\"{}: {words}\" style=\"max-width:100%\"></p>\n",
@@ -185,14 +241,7 @@ impl Site<'_> {
         body += &format!(
             "<p><a href=\"index.html#mesh-{stem}\">3D view and interactive plots</a></p>\n"
         );
-        for kind in ["hausdorff", "time"] {
-            let file = format!("plots/mesh-{stem}-{kind}.svg");
-            if is_here(&file) {
-                body += &format!(
-                    "<img src=\"{file}\" alt=\"{kind}\" style=\"max-width:min(100%,44rem)\">\n"
-                );
-            }
-        }
+        body += &self.plots(&format!("mesh-{stem}"));
         let mut table = mesh_table(self.comparison, mesh, "");
         table.caption = "Every method at every level".to_owned();
         body += &to_html(&table, &|text| self.link(text));

@@ -16,9 +16,9 @@ use crate::comparison::Comparison;
 use crate::differences::{difference_tables, differences_csv};
 use crate::header::Header;
 use crate::overview::overview_table;
-use crate::page::{MeshPart, MeshView, Page, gzip};
+use crate::page::{MeshPart, MeshPicture, MeshView, Page, gzip};
 use crate::pictures::{FOLDER, PictureStrip, VIEWS, strips};
-use crate::plots::{Figure, mean_figures, mesh_figures};
+use crate::plots::{Figure, mean_figures, mesh_figures, styles};
 use crate::summary::{MEANS, by_count, means_table, native_curves, native_table};
 use crate::tables::{Table, mesh_table, to_csv, to_latex, to_markdown, topic_tables};
 use crate::view3d::text_of;
@@ -82,7 +82,8 @@ pub fn write_report(
         files.write(name, &csv)?;
     }
     let figures = mean_figures(&comparison, &summaries, &natives);
-    files.write_plots(&figures.iter().collect::<Vec<_>>())?;
+    let styles = styles(header, &comparison);
+    files.write_plots(&figures.iter().collect::<Vec<_>>(), &styles)?;
 
     let stems = file_stems(comparison.meshes.iter().map(String::as_str));
     let has_plots = stems.len() <= MOST_PLOTTED;
@@ -103,7 +104,7 @@ pub fn write_report(
         // A site has the two that its pages show.
         let drawn: Vec<&Figure> =
             part.figures.iter().filter(|figure| figure.leading || !header.is_site).collect();
-        files.write_plots(&drawn)?;
+        files.write_plots(&drawn, &styles)?;
         meshes.push(part);
     }
     let bibtex = header.bibtex(&comparison.methods);
@@ -158,17 +159,19 @@ const PICTURES: usize = 3 << 20;
 /// Characters of the 3D views that are part of the page; further ones are read when they are opened.
 const VIEWS_INSIDE: usize = 2 << 20;
 
-/// The address of the picture of a mesh's results, if it is in the folder: within the page, while there is room.
-fn picture(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option<String> {
+/// The picture of a mesh's results, if it is in the folder: within the page, while there is room.
+fn picture(dir: &Path, strip: Option<&PictureStrip>, room: &mut usize) -> Option<MeshPicture> {
     let strip = strip?;
     let bytes = fs::read(dir.join(&strip.file)).ok()?;
-    Some(match room.checked_sub(bytes.len()) {
+    let address = match room.checked_sub(bytes.len()) {
         Some(left) => {
             *room = left; // first come, first embedded
             format!("data:image/png;base64,{}", BASE64_STANDARD.encode(bytes))
         }
         None => format!("./{}", strip.file),
-    })
+    };
+    let captions = strip.panels.iter().map(|(_, caption)| caption.clone()).collect();
+    Some(MeshPicture { address, layout: strip.layout(), captions })
 }
 
 /// The 3D view of a mesh's results, if it is in the folder: within the page, while there is room.
@@ -217,9 +220,9 @@ impl Files<'_> {
         Ok(())
     }
 
-    fn write_plots(&mut self, figures: &[&Figure]) -> Result<(), FileError> {
+    fn write_plots(&mut self, figures: &[&Figure], styles: &[usize]) -> Result<(), FileError> {
         for figure in figures {
-            if let Some(svg) = figure.to_svg()? {
+            if let Some(svg) = figure.to_svg(styles)? {
                 self.write(&format!("plots/{}.svg", figure.stem), svg.as_bytes())?;
             }
         }

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::{fs, io, thread};
+use std::{fs, io, iter, thread};
 
 use medial_reports::reasons;
 use medial_run::hash::hex_digest;
@@ -74,12 +74,12 @@ pub fn run_items(
         lanes.iter_mut().zip(supervisors).for_each(|(lane, supervisor)| lane.push(supervisor));
     }
     let takes_turns = |a: &Item, b: &Item| a.scene == b.scene && a.repeat > 1 && b.repeat > 1;
-    let turns = items.iter().map(|item| item.repeat.max(1)).sum();
+    let turns = items.iter().flat_map(|item| iter::repeat_n(seconds(item), item.repeat.max(1)));
     let desk = Mutex::new(Desk {
         jobs: lanes.len(),
         batches: items.chunk_by(takes_turns).enumerate().collect(),
         stores,
-        progress: Progress::new(is_quiet, turns),
+        progress: Progress::new(is_quiet, turns.collect()),
     });
     thread::scope(|scope| {
         let lanes: Vec<_> =
@@ -89,6 +89,14 @@ pub fn run_items(
         ended.collect::<Vec<_>>().into_iter().collect()
     })
 }
+
+/// The cost of a turn of an item against others, for the estimate of the remaining time.
+fn seconds(item: &Item) -> f64 {
+    medial_methods::usual_seconds(&item.method.id).unwrap_or(UNKNOWN)
+}
+
+/// The cost of a method from elsewhere.
+const UNKNOWN: f64 = 3.0;
 
 /// One supervisor of each side.
 type Lane<'s, 'a> = Vec<&'s mut Supervisor<'a>>;
@@ -147,7 +155,7 @@ fn run_batch(
                     merge(records, turn, again);
                 }
             }
-            lock(desk).progress.done();
+            lock(desk).progress.done(seconds(item));
         }
     }
     Ok(all)

@@ -14,12 +14,14 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use medial_run::record::Machine;
 use medial_run::text::{betti, counted, escape_html, grouped, printable};
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, level_label};
 use crate::header::{Header, RunNote, method_pages};
 use crate::metric::{BELOW_30, COMPARED, EPSILON, Metric, SPHERES_ONLY};
-use crate::plots::{Figure, symbol};
+use crate::plots::{Figure, styles, symbol};
+use crate::render::Layout;
 use crate::tables::Table;
 
 /// The content of the page.
@@ -45,9 +47,16 @@ pub(crate) struct MeshPart {
     /// Name of its files.
     pub(crate) stem: String,
     pub(crate) figures: Vec<Figure>,
-    /// The address of a picture of its results.
-    pub(crate) picture: Option<String>,
+    pub(crate) picture: Option<MeshPicture>,
     pub(crate) view: Option<MeshView>,
+}
+
+/// A picture of a mesh's results, out of which the page cuts its panels.
+#[derive(Serialize)]
+pub(crate) struct MeshPicture {
+    pub(crate) address: String,
+    pub(crate) layout: Layout,
+    pub(crate) captions: Vec<String>,
 }
 
 /// A 3D view of a mesh's results.
@@ -171,8 +180,9 @@ impl Page<'_> {
     fn report(&self) -> Value {
         let (header, comparison) = (self.header, self.comparison);
         let is_one = comparison.meshes.len() == 1;
-        let series = comparison.series.iter().enumerate().map(|(index, name)| {
-            let (colour, symbol, hollow) = symbol(index);
+        let styles = styles(header, comparison);
+        let series = comparison.series.iter().zip(styles).map(|(name, style)| {
+            let (colour, symbol, hollow) = symbol(style);
             json!({"name": name, "colour": colour, "symbol": symbol, "hollow": hollow})
         });
         let metrics = comparison.columns().into_iter().map(|metric| {

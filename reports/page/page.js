@@ -91,14 +91,29 @@ const captioned = (table) => [make("h3", {}, table.caption), tableOf(table), ...
 const listOf = (pairs) =>
   make("dl", {}, ...pairs.flatMap(([term, ...texts]) => [make("dt", {}, term), make("dd", {}, ...texts)]));
 
+let pictures = 0; // made so far
 const strip = (mesh, link) => {
   if (!mesh.picture) return null;
   const words = `${mesh.name}: medial meshes at one requested number of spheres (in parentheses: another number, which the method reached instead), the least ` +
     "Hausdorff error (in % of the diagonal) first, coloured by radius. Below them the surface: red where the reconstruction reaches beyond it, blue " +
     "where it falls short. Errors beyond the scale have its last colour.";
-  const image = make("img", { src: mesh.picture, alt: words });
-  return make("figure", { class: "strip" }, make("div", {}, link ? make("a", { href: link }, image) : image),
-    make("figcaption", {}, words));
+  const { address, layout: { whole: [width, height], panel, axes, errors, bars }, captions } = mesh.picture;
+  const svg = (name, attributes, ...inside) => {
+    const element = document.createElementNS("http://www.w3.org/2000/svg", name);
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+    element.append(...inside);
+    return element;
+  };
+  // The file is read once; each panel shows a part of it.
+  const id = `picture-${pictures++}`;
+  const source = svg("svg", { class: "source", "aria-hidden": "true" }, svg("defs", {}, svg("image", { id, href: address, width, height })));
+  const part = (box, name) => svg("svg", { viewBox: box.join(" "), role: "img", "aria-label": name }, svg("use", { href: `#${id}` }));
+  const panels = captions.map((caption, k) => make("figure", { class: "panel" }, part([...axes[k], ...panel], `medial mesh: ${caption}`),
+    part([...errors[k], ...panel], `errors: ${caption}`), make("figcaption", {}, caption)));
+  const scales = make("div", { class: "panel scales" }, ...bars.map((bar, k) => part(bar, ["scale of radii", "scale of errors"][k])));
+  const all = make("div", { class: "panels" }, ...panels, scales);
+  const more = link ? [" ", make("a", { href: link }, "More of this mesh."), ] : [];
+  return make("figure", { class: "strip" }, source, all, make("figcaption", {}, words, ...more));
 };
 
 // Picture, 3D view, initial medial mesh and curves of one mesh.

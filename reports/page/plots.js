@@ -9,11 +9,9 @@ const plotOf = (figure) => {
   const lay = (axis, value) => (figure[axis].scale === "log" ? Math.log(value) : value);
   const unlay = (axis, value) => (figure[axis].scale === "log" ? Math.exp(value) : value);
   const laid = ([x, y], more) => ({ u: lay("x", x), v: lay("y", y), x, y, ...more });
-  const points = figure.curves.flatMap((curve) => curve.points.map(([x, y, n, spheres, , bar]) =>
+  const points = figure.curves.flatMap((curve) => curve.points.map(([x, y, n, spheres, bar]) =>
     laid([x, y], { n, spheres, bar, curve })).filter(({ u, v }) => Number.isFinite(u) && Number.isFinite(v)));
   const lines = figure.curves.flatMap((curve) => curve.points.map((at) => laid(at, { curve })));
-  const tags = figure.curves.flatMap((curve) => curve.points.filter((point) => point[4] !== null)
-    .map((point) => laid(point, { text: point[4], curve })));
 
   // A linear axis begins at zero, a logarithmic one spans at least a factor of two, or a single value
   // would have no scale.
@@ -40,12 +38,30 @@ const plotOf = (figure) => {
       tickFormat: (at) => unlay(axis, at).toLocaleString("en", { maximumSignificantDigits: 3 }),
     };
   };
-  // Tags that cover no other one.
-  const apart = () => {
+  // The front: points that no visible one beats in both directions. Means over fewer meshes than the others are not
+  // among them.
+  const front = () => {
+    const most = d3.max(points, ({ n }) => n);
+    const inOrder = points.filter(({ n, curve }) => n === most && !hidden.has(curve.series))
+      .sort((a, b) => a.u - b.u || a.v - b.v);
+    const isBetter = (a, b) => (figure.higher ? a.v > b.v : a.v < b.v);
+    return inOrder.reduce((best, point) => (best.length && !isBetter(point, best.at(-1)) ? best : [...best, point]), []);
+  };
+  // Numbers of spheres at points, where no axis has them, that cover no other one.
+  const apart = (tagged) => {
     const share = (tag, key) => (tag[key] - view[key][0]) / (view[key][1] - view[key][0]);
-    return tags.filter(isInside).reduce((visible, tag) => (visible.some((other) =>
+    return tagged.filter(({ spheres }) => spheres !== null).filter(isInside).reduce((visible, tag) => (visible.some((other) =>
       Math.abs(share(tag, "u") - share(other, "u")) < 0.07 && Math.abs(share(tag, "v") - share(other, "v")) < 0.04)
       ? visible : [...visible, tag]), []);
+  };
+  const tags = (tagged, name) => Plot.text(apart(tagged), {
+    x: "u", y: "v", text: ({ spheres }) => Math.round(spheres).toLocaleString("en"), dx: 7, dy: -7, textAnchor: "start",
+    fontSize: 11, fontWeight: 600, stroke: "var(--card)", fill: "currentColor", className: `tags ${name}`,
+  });
+  // Those of one curve at a time, or of the front.
+  const showTags = (point) => {
+    const shown = point ? `curve-${figure.curves.indexOf(point.curve)}` : "front";
+    for (const group of chart.querySelectorAll(".tags")) group.style.display = group.classList.contains(shown) ? "" : "none";
   };
 
   const words = ({ x, y, n, spheres, bar, curve }) => {
@@ -77,11 +93,13 @@ const plotOf = (figure) => {
       x: axisOf("x", "u"), y: axisOf("y", "v"), color: { type: "identity" },
       marks: [
         Plot.frame({ stroke: "var(--rule)" }),
+        Plot.line(front(), { x: "u", y: "v", curve: "step-after", clip: true, stroke: "var(--dim)", strokeOpacity: 0.3, strokeWidth: 7 }),
         Plot.line(solid, { ...common, z, stroke: colour, strokeWidth: 2 }),
         Plot.ruleX(barred, { x: "u", y1: ({ bar }) => lay("y", bar[0]), y2: ({ bar }) => lay("y", bar[1]), stroke: colour, strokeOpacity: 0.5, clip: true }),
         Plot.line(dashed, { ...common, z, stroke: colour, strokeWidth: 2, strokeDasharray: "7 5" }),
         Plot.dot(seen, { ...common, symbol, stroke: colour, fill: hollow, r: 4, clip: false }),
-        Plot.text(apart(), { x: "u", y: "v", text: "text", dx: 7, dy: -7, textAnchor: "start", fontSize: 10 }),
+        tags(front(), "front"),
+        ...figure.curves.map((curve, k) => tags(points.filter((point) => point.curve === curve), `curve-${k}`)),
         Plot.dot(chosen, { x: "u", y: "v", r: 9, stroke: "currentColor", strokeWidth: 2 }),
         Plot.tip(chosen, tip),
         Plot.tip(seen, Plot.pointer({ ...tip, maxRadius: REACH })),
@@ -95,6 +113,8 @@ const plotOf = (figure) => {
     const hadFocus = document.activeElement === chart;
     if (chart) chart.replaceWith(svg);
     chart = svg;
+    chart.addEventListener("input", () => showTags(chart.value ?? current));
+    showTags(current);
     reset.hidden = view === whole;
     announcement.textContent = chosen.length ? words(current) : "";
     if (hadFocus) svg.focus({ preventScroll: true });
@@ -220,6 +240,9 @@ const plotOf = (figure) => {
     });
     legend.append(row);
   }
+  const band = make("span", { class: "band" });
+  const numbers = points.some(({ spheres }) => spheres !== null) ? ", with its numbers of spheres" : "";
+  legend.append(make("span", { class: "front-note" }, band, `front: no other point is better in both${numbers}`));
   const tools = make("div", { class: "tools" }, reset, button("−", "show more", () => zoom(0.5)), button("+", "enlarge", () => zoom(2)));
   stage.append(draw());
   box.append(make("figcaption", {}, figure.title, tools), stage, legend, announcement);

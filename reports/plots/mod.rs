@@ -6,12 +6,13 @@
 mod axis;
 mod svg;
 
-use medial_run::text::{grouped, significant};
+use medial_run::text::significant;
 use serde_json::{Value, json};
 
 use crate::comparison::{Comparison, Entry, reached};
+use crate::header::Header;
 use crate::metric::{
-    COMPLETENESS, GEOMETRIC, HAUSDORFF, LARGER_SIDE, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES,
+    Better, COMPLETENESS, GEOMETRIC, HAUSDORFF, LARGER_SIDE, MEAN_ERROR, MIN_ANGLE, Metric, SPIKES,
     TOTAL_SECONDS,
 };
 use crate::summary::{CountSummary, NativeCurve};
@@ -26,6 +27,8 @@ pub(crate) struct Figure {
     pub(crate) title: String,
     pub(crate) x: String,
     pub(crate) y: (String, Scale),
+    /// Better direction along the vertical axis; along the bottom less is better.
+    pub(crate) better: Better,
     pub(crate) curves: Vec<Curve>,
     /// Whether the page shows it unfolded.
     pub(crate) leading: bool,
@@ -54,13 +57,40 @@ pub(crate) struct Point {
     pub(crate) n: Option<usize>,
     /// Spheres of the result, or their mean, where no axis shows them.
     pub(crate) spheres: Option<f64>,
-    /// Text next to the point.
-    pub(crate) tag: Option<String>,
     /// The ends of a bar: a 95 % interval over meshes, or the range over seeds.
     pub(crate) bar: Option<[f64; 2]>,
 }
 
+/// The style of each series, for [`symbol`]: a method has the same one in every report.
+///
+/// The header lists all methods of the program in their order; other rows, as those with parameters, have the
+/// styles after them.
+pub(crate) fn styles(header: &Header, comparison: &Comparison<'_>) -> Vec<usize> {
+    let mut other = header.methods.len()..;
+    let style = |name: &String| {
+        let own = header.methods.iter().position(|note| note.id == *name);
+        own.or_else(|| other.next()).unwrap_or(0)
+    };
+    comparison.series.iter().map(style).collect()
+}
+
 impl Figure {
+    /// The front: points that no other one beats in both directions, from left to right. Means over fewer meshes
+    /// than the others are not among them.
+    pub(crate) fn front(&self) -> Vec<&Point> {
+        let mut points: Vec<&Point> = self.curves.iter().flat_map(|curve| &curve.points).collect();
+        let most = points.iter().map(|point| point.n).max().flatten();
+        points.retain(|point| point.n == most);
+        points.sort_by(|a, b| a.x.total_cmp(&b.x).then_with(|| a.y.total_cmp(&b.y)));
+        let mut front: Vec<&Point> = vec![];
+        for point in points {
+            if front.last().is_none_or(|last| self.better.prefers(point.y, last.y)) {
+                front.push(point);
+            }
+        }
+        front
+    }
+
     /// The figure for the script of the page: numbers with five digits.
     pub(crate) fn to_json(&self) -> Value {
         let rounded = |value| significant(value, 5).parse().unwrap_or(value);
@@ -68,7 +98,7 @@ impl Figure {
             let points = curve.points.iter().map(|point| {
                 let [x, y] = [point.x, point.y].map(rounded);
                 let bar = point.bar.map(|ends| ends.map(rounded));
-                json!([x, y, point.n, point.spheres.map(rounded), point.tag, bar])
+                json!([x, y, point.n, point.spheres.map(rounded), bar])
             });
             json!({
                 "series": curve.series, "label": curve.label, "name": curve.name, "of": curve.of,
@@ -78,6 +108,7 @@ impl Figure {
         json!({
             "title": self.title, "leading": self.leading,
             "x": {"title": self.x, "scale": Scale::Log}, "y": {"title": self.y.0, "scale": self.y.1},
+            "higher": self.better == Better::Higher,
             "curves": curves.collect::<Vec<_>>(),
         })
     }
@@ -129,13 +160,14 @@ impl Kind {
             title: format!("{of}: {title}"),
             x: if self.is_over_time() { "time (s)".to_owned() } else { "spheres".to_owned() },
             y: ((*y).to_owned(), scale),
+            better: metric.better,
             curves,
             leading: matches!(*name, "hausdorff" | "time"),
         })
     }
 
-    /// A curve of results or means. Over time both ends are tagged with their number of spheres, which no axis shows.
-    /// Dashes are at native levels.
+    /// A curve of results or means. Over time the points have their number of spheres, which no axis shows. Dashes are at
+    /// native levels.
     fn curve(
         &self,
         series: usize,
@@ -143,18 +175,13 @@ impl Kind {
         dashed: bool,
         points: impl IntoIterator<Item = Place>,
     ) -> Curve {
-        let mut points: Vec<Point> = (points.into_iter())
+        let points: Vec<Point> = (points.into_iter())
             .filter_map(|Place { spheres, seconds, y, n, bar }| {
                 let (x, spheres) =
                     if self.is_over_time() { (seconds?, Some(spheres)) } else { (spheres, None) };
-                Some(Point { x, y: y?, n: Some(n), spheres, tag: None, bar })
+                Some(Point { x, y: y?, n: Some(n), spheres, bar })
             })
             .collect();
-        for k in [0, points.len().saturating_sub(1)] {
-            if let Some(point) = points.get_mut(k) {
-                point.tag = point.spheres.map(|spheres| grouped(spheres as u64));
-            }
-        }
         let [label, name, of] = [name, name, of].map(str::to_owned);
         Curve { series, label, name, of, points, dashed }
     }

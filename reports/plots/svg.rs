@@ -1,14 +1,14 @@
-//! Figures as SVG for papers, by plotters: one line and one marker for each method, the legend at
-//! the right of the data.
+//! Figures as SVG for papers, by plotters: one line and one marker for each method, the front as grey steps behind
+//! them, the legend at the right of the data.
 //!
 //! The first colours are those of Okabe and Ito (2008, "Color universal design") without black and
 //! yellow, which vanish on a dark or a light page, and with three of Paul Tol's that show on both. A
-//! method keeps its colour and its marker in every figure of a report.
+//! method keeps its colour and its marker in every figure of every report.
 
 use std::error::Error;
 
 use medial_run::error::FileError;
-use medial_run::text::{printable, shortened};
+use medial_run::text::{grouped, printable, shortened};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -23,10 +23,11 @@ const LEGEND_ROW: i32 = 42;
 
 const INK: RGBColor = RGBColor(0x20, 0x21, 0x24);
 const GRID: RGBColor = RGBColor(0xE3, 0xE5, 0xE8);
+const FRONT: RGBColor = RGBColor(0xD0, 0xD3, 0xD8);
 
-const COLOURS: [u32; 12] = [
+const COLOURS: [u32; 14] = [
     0x0072B2, 0xD55E00, 0x009E73, 0xCC79A7, 0xE69F00, 0x56B4E9, 0xAA3377, 0x999933, 0x777777,
-    0x8073AC, 0x44AA99, 0xA65628,
+    0x8073AC, 0x44AA99, 0xA65628, 0xDC1C3C, 0x117733,
 ];
 
 /// Markers by the page's names of symbols, and whether they are hollow.
@@ -44,15 +45,15 @@ const MARKERS: [(&str, bool); 11] = [
     ("diamond", true),
 ];
 
-/// Colour, symbol, and whether it is hollow. Twelve colours and eleven markers repeat together only
-/// after 132 series.
-pub(crate) fn symbol(series: usize) -> (String, &'static str, bool) {
-    let (name, hollow) = MARKERS[series % MARKERS.len()];
-    (format!("#{:06x}", COLOURS[series % COLOURS.len()]), name, hollow)
+/// Colour, symbol, and whether it is hollow, of a [style](super::styles). Fourteen colours and eleven markers repeat
+/// together only after 154 styles.
+pub(crate) fn symbol(style: usize) -> (String, &'static str, bool) {
+    let (name, hollow) = MARKERS[style % MARKERS.len()];
+    (format!("#{:06x}", COLOURS[style % COLOURS.len()]), name, hollow)
 }
 
-fn colour(series: usize) -> RGBColor {
-    let [_, r, g, b] = COLOURS[series % COLOURS.len()].to_be_bytes();
+fn colour(style: usize) -> RGBColor {
+    let [_, r, g, b] = COLOURS[style % COLOURS.len()].to_be_bytes();
     RGBColor(r, g, b)
 }
 
@@ -71,28 +72,28 @@ fn font(size: i32, at: HPos) -> TextStyle<'static> {
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 impl Figure {
-    /// The figure as SVG; `None` where there is no point to draw.
-    pub(crate) fn to_svg(&self) -> Result<Option<String>, FileError> {
+    /// The figure as SVG, its series in these styles; `None` where there is no point to draw.
+    pub(crate) fn to_svg(&self, styles: &[usize]) -> Result<Option<String>, FileError> {
         let points: Vec<&Point> = self.curves.iter().flat_map(|curve| &curve.points).collect();
         let x = Axis::fit(Scale::Log, points.iter().map(|point| point.x));
         let bars = points.iter().flat_map(|point| point.bar.into_iter().flatten());
         let y = Axis::fit(self.y.1, points.iter().map(|point| point.y).chain(bars));
         let (Some(x), Some(y)) = (x, y) else { return Ok(None) };
-        let rows = self.curves.iter().filter(|curve| !curve.label.is_empty()).count() + 1;
+        let rows = self.curves.iter().filter(|curve| !curve.label.is_empty()).count() + 2;
         let size = (WIDTH as u32, HEIGHT.max(rows as i32 * LEGEND_ROW + 120) as u32);
         let mut svg = String::new();
-        self.draw(x, y, &SVGBackend::with_string(&mut svg, size).into_drawing_area())
+        self.draw(x, y, styles, &SVGBackend::with_string(&mut svg, size).into_drawing_area())
             .map_err(|error| FileError(format!("plot: {error}")))?;
         Ok(Some(svg))
     }
 
-    fn draw(&self, x: Axis, y: Axis, area: &Area<'_>) -> Drawn {
+    fn draw(&self, x: Axis, y: Axis, styles: &[usize], area: &Area<'_>) -> Drawn {
         area.fill(&WHITE)?; // dark viewers would swallow the ink
         let title = printable(&shortened(&self.title, 76));
         area.draw(&Text::new(title, (28, 40), font(30, HPos::Left)))?;
         let (_, below) = area.split_vertically(68);
         let longest = self.curves.iter().map(|curve| legend_text(curve).chars().count()).max();
-        let legend_width = (88 + 14 * longest.unwrap_or(0).max(12) as i32).min(460);
+        let legend_width = (88 + 14 * longest.unwrap_or(0).max(19) as i32).min(460);
         let (plot, legend) = below.split_horizontally(WIDTH - legend_width);
         let (x_ticks, y_ticks) = (x.ticks.len(), y.ticks.len());
         let mut chart = ChartBuilder::on(&plot)
@@ -117,9 +118,20 @@ impl Figure {
             .y_desc(&self.y.0)
             .draw()?;
         let inner = chart.plotting_area().strip_coord_spec();
-        let mut taken = Vec::new(); // shared by all curves: tags of two must not meet
+        // To the plot without its margins.
+        let (left, top) = inner.get_base_pixel();
+        let relative = |(x, y): (i32, i32)| (x - left, y - top);
+        let front = self.front();
+        // A result serves for every larger budget until the next one is better.
+        let mut steps: Vec<(f64, f64)> = vec![];
+        for point in &front {
+            steps.extend(steps.last().map(|&(_, y)| (point.x, y)));
+            steps.push((point.x, point.y));
+        }
+        chart.draw_series(LineSeries::new(steps, FRONT.stroke_width(12)))?;
         for curve in &self.curves {
-            let stroke = colour(curve.series).stroke_width(4);
+            let style = styles[curve.series];
+            let stroke = colour(style).stroke_width(4);
             let line: Vec<(f64, f64)> =
                 curve.points.iter().map(|point| (point.x, point.y)).collect();
             if curve.dashed {
@@ -132,39 +144,48 @@ impl Figure {
             for point in &curve.points {
                 if let Some([low, high]) = point.bar {
                     let ends = vec![(point.x, low), (point.x, high)];
-                    chart.draw_series([PathElement::new(
-                        ends,
-                        colour(curve.series).stroke_width(2),
-                    )])?;
+                    chart.draw_series([PathElement::new(ends, colour(style).stroke_width(2))])?;
                 }
-                let (left, top) = chart.backend_coord(&(point.x, point.y));
-                // Relative to the plot, without its margins.
-                let at = (left - inner.get_base_pixel().0, top - inner.get_base_pixel().1);
-                draw_marker(&inner, curve.series, at)?; // above its own line
-                let free = point.tag.as_ref().and_then(|tag| free_place(at, tag, &mut taken));
-                if let (Some(tag), Some(at)) = (&point.tag, free) {
-                    let text = Text::new(tag.clone(), at, font(20, HPos::Left));
-                    inner.draw(&text)?;
-                }
+                let at = chart.backend_coord(&(point.x, point.y));
+                draw_marker(&inner, style, relative(at))?; // above its own line
             }
         }
-        self.draw_legend(&legend)?;
+        let mut taken = Vec::new();
+        for point in front {
+            let Some(tag) = point.spheres.map(|spheres| grouped(spheres as u64)) else { continue };
+            let at = relative(chart.backend_coord(&(point.x, point.y)));
+            if let Some(at) = free_place(at, &tag, &mut taken) {
+                inner.draw(&Text::new(tag, at, font(20, HPos::Left)))?;
+            }
+        }
+        self.draw_legend(styles, &legend)?;
         Ok(area.present()?)
     }
 
-    fn draw_legend(&self, area: &Area<'_>) -> Drawn {
+    fn draw_legend(&self, styles: &[usize], area: &Area<'_>) -> Drawn {
         let mut y = 36;
         for curve in self.curves.iter().filter(|curve| !curve.label.is_empty()) {
-            let stroke = colour(curve.series).stroke_width(4);
+            let style = styles[curve.series];
+            let stroke = colour(style).stroke_width(4);
             // A dash on either side of the marker.
             let dashes = if curve.dashed { vec![(0, 10), (38, 48)] } else { vec![(0, 48)] };
             for (from, to) in dashes {
                 area.draw(&PathElement::new(vec![(from, y), (to, y)], stroke))?;
             }
-            draw_marker(area, curve.series, (24, y))?;
+            draw_marker(area, style, (24, y))?;
             area.draw(&Text::new(legend_text(curve), (62, y), font(24, HPos::Left)))?;
             y += LEGEND_ROW; // unlabelled curves take no row
         }
+        area.draw(&PathElement::new(vec![(0, y), (48, y)], FRONT.stroke_width(12)))?;
+        let text = match self
+            .curves
+            .iter()
+            .any(|curve| curve.points.iter().any(|p| p.spheres.is_some()))
+        {
+            true => "front, with spheres",
+            false => "front",
+        };
+        area.draw(&Text::new(text, (62, y), font(24, HPos::Left)))?;
         Ok(())
     }
 }
@@ -191,10 +212,10 @@ fn free_place((x, y): (i32, i32), tag: &str, taken: &mut Vec<[i32; 4]>) -> Optio
     })
 }
 
-/// Draws the marker of a series around a pixel. Hollow ones hide the line beneath, so that they differ
+/// Draws the marker of a style around a pixel. Hollow ones hide the line beneath, so that they differ
 /// from filled ones.
-fn draw_marker(area: &Area<'_>, series: usize, (x, y): (i32, i32)) -> Drawn {
-    let (colour, (name, hollow)) = (colour(series), MARKERS[series % MARKERS.len()]);
+fn draw_marker(area: &Area<'_>, style: usize, (x, y): (i32, i32)) -> Drawn {
+    let (colour, (name, hollow)) = (colour(style), MARKERS[style % MARKERS.len()]);
     let (stroke, fill) = (colour.stroke_width(4), if hollow { WHITE } else { colour });
     // Corners, the turn of the first one from the top as a share of a circle, radii of every other corner.
     let (corners, turn, radii) = match name {
@@ -234,8 +255,8 @@ mod tests {
 
     #[test]
     fn styles_differ() {
-        let styles: std::collections::BTreeSet<_> = (0..132).map(symbol).collect();
-        assert_eq!(styles.len(), 132);
+        let styles: std::collections::BTreeSet<_> = (0..154).map(symbol).collect();
+        assert_eq!(styles.len(), 154);
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub(crate) use scene::Layer;
 #[cfg(test)]
 use scene::Scene;
 pub use strip::ColourBy;
-pub(crate) use strip::{Errors, Panel, PanelRow, Strip, draw, painted, strip};
+pub(crate) use strip::{Errors, Layout, Panel, PanelRow, Strip, draw, painted, strip};
 
 /// The longest side of a picture, in pixels. Edge functions stay exact up to it.
 const MOST_PIXELS: usize = 8192;

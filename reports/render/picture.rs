@@ -194,7 +194,7 @@ pub(crate) struct Bar {
     /// Values are shown times this: 100 over the bounding-box diagonal for percentages of it.
     pub(crate) times: f64,
     /// Lines above the bar.
-    pub(crate) title: [&'static str; 2],
+    pub(crate) title: &'static [&'static str],
     /// Lines below it.
     pub(crate) note: &'static [&'static str],
 }
@@ -204,7 +204,7 @@ const LETTER: f64 = 0.0165;
 const LEAST_LETTER: f64 = 8.0;
 
 /// Sizes in heights of a capital: the column, the bar's width, its greatest height, ticks, a line of text.
-const COLUMN: f64 = 11.5;
+const COLUMN: f64 = 16.0;
 const WIDTH: f64 = 1.9;
 const TALLEST: f64 = 30.0;
 const TICK: f64 = 0.5;

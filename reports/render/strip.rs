@@ -4,7 +4,7 @@ use medial::ColourMap;
 use medial::complex::{MedialMesh, SheetGraph, SheetOptions};
 use medial::surface::TriMesh;
 use medial_run::text::round_up;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::RenderError;
 use super::camera::{Camera, Frame};
@@ -42,7 +42,7 @@ impl ColourBy {
             return (Some(Scale { lo: 0.0, hi: 1.0, map: ColourMap::Parts }), None);
         }
         let scale = (self == Self::Radius).then(|| Scale::radii(meshes.iter().copied()));
-        let title = ["radius", "% of diagonal"];
+        let title = &["radius", "% of diagonal"];
         let bar = |scale| Bar { scale, times: 100.0 / diagonal, title, note: &[] };
         (scale, scale.map(bar))
     }
@@ -85,8 +85,11 @@ impl Errors<'_> {
     /// The bar of errors up to `end`, with a remark where values are beyond.
     pub(crate) fn bar(all: &[&Self], end: f64, diagonal: f64) -> Bar {
         let is_clipped = all.iter().any(|errors| errors.values.iter().any(|v| v.abs() > end));
-        let note: &[&str] = if is_clipped { &["larger values:", "last colour"] } else { &[] };
-        let title = ["error", "% of diagonal"];
+        let title = &["error", "% of diagonal", "red: reaches beyond"];
+        let note: &[&str] = match is_clipped {
+            true => &["blue: falls short", "larger values:", "last colour"],
+            false => &["blue: falls short"],
+        };
         Bar { scale: Scale::errors(end), times: 100.0 / diagonal, title, note }
     }
 }
@@ -162,6 +165,41 @@ pub(crate) fn strip<'a>(
     draw(rows, strip.size, strip.background, &frame)
 }
 
+/// Pixels of a line of captions below panels of a size: one line of text with some room below.
+fn caption_height(size: [usize; 2]) -> usize {
+    (LINE * letter_size(size) * 1.3).ceil() as usize
+}
+
+/// Where the parts of a [`strip`] with captions and errors are, in pixels from the top left corner.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub(crate) struct Layout {
+    /// Width and height of the picture.
+    pub(crate) whole: [usize; 2],
+    /// Width and height of a panel, without its caption.
+    pub(crate) panel: [usize; 2],
+    /// Corners of the medial meshes and of their reconstructions.
+    pub(crate) axes: Vec<[usize; 2]>,
+    pub(crate) errors: Vec<[usize; 2]>,
+    /// Left, top, width and height of the bars of radii and of errors.
+    bars: [[usize; 4]; 2],
+}
+
+impl Layout {
+    /// The layout of a number of panels of a size, so many in a line.
+    pub(crate) fn of(count: usize, across: usize, panel: [usize; 2]) -> Self {
+        let (lines, height) = (count.div_ceil(across), panel[1] + caption_height(panel));
+        let (columns, bar) = (count.min(across), Bar::column(panel));
+        let corner = |k: usize, first| [k % across * panel[0], (first + k / across) * height];
+        Self {
+            whole: [columns * panel[0] + bar, 2 * lines * height],
+            panel,
+            axes: (0..count).map(|k| corner(k, 0)).collect(),
+            errors: (0..count).map(|k| corner(k, lines)).collect(),
+            bars: [0, lines].map(|line| [columns * panel[0], line * height, bar, panel[1]]),
+        }
+    }
+}
+
 /// A row of panels: the layers and the caption of each, and the bar at the end.
 pub(crate) struct PanelRow<'a> {
     pub(crate) cells: Vec<Option<(Vec<Layer<'a>>, &'a str)>>,
@@ -178,9 +216,8 @@ pub(crate) fn draw(
     let ([width, height], ink) = (size, background.ink());
     let letter = letter_size(size);
     let mut cells = rows.iter().flat_map(|row| row.cells.iter().flatten());
-    // A caption is one line of text with some room below.
     let has_captions = cells.any(|(_, caption)| !caption.is_empty());
-    let caption = if has_captions { (LINE * letter * 1.3).ceil() as usize } else { 0 };
+    let caption = if has_captions { caption_height(size) } else { 0 };
     let column = if rows.iter().any(|row| row.bar.is_some()) { Bar::column(size) } else { 0 };
     let columns = rows.iter().map(|row| row.cells.len()).max().unwrap_or(0);
     let whole = [columns * width + column, rows.len() * (height + caption)];

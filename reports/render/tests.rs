@@ -206,8 +206,11 @@ fn the_scale_of_errors_shows_the_better_half() {
     let all: Vec<&Errors<'_>> = panels.iter().collect();
     let end = Errors::common_scale(&all, 2.0) / 2.0;
     assert!((0.01..=0.02).contains(&end), "{end}");
-    assert_eq!(Errors::bar(&all, 2.0 * end, 2.0).note, ["larger values:", "last colour"]);
-    assert!(Errors::bar(&all[..2], 2.0 * end, 2.0).note.is_empty());
+    assert_eq!(
+        Errors::bar(&all, 2.0 * end, 2.0).note,
+        ["blue: falls short", "larger values:", "last colour"]
+    );
+    assert_eq!(Errors::bar(&all[..2], 2.0 * end, 2.0).note, ["blue: falls short"]);
 }
 
 #[test]
