@@ -10,7 +10,7 @@
 //! | [`plugin`], [`check`] | methods as external programs, the conformance tests |
 //! | [`study`] | the items to run |
 //! | `store`, `exec` | the folder of records, the workers |
-//! | `rebuild` | the report of a store |
+//! | [`own_metric`], `rebuild` | metrics of the user, the report of a store |
 //! | `args`, [`exit`], `output`, `files`, `interrupt` | shared by the verbs |
 //! | `cmd`, [`cli`] | one file for each verb, their list |
 
@@ -24,6 +24,7 @@ mod files;
 pub mod host;
 mod interrupt;
 mod output;
+pub mod own_metric;
 pub mod plugin;
 pub mod process_tree;
 mod progress;
@@ -33,6 +34,7 @@ mod store;
 pub mod study;
 
 pub use cli::{main_hosted, main_with};
+pub use rebuild::measure_own;
 
 /// Counts what each item takes of the heap.
 #[global_allocator]

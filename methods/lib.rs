@@ -197,7 +197,7 @@ mod tests {
     use std::fs;
     use std::path::Path;
 
-    use super::{Registered, registry, usual_seconds, version};
+    use super::{Registered, SECONDS, registry, usual_seconds, version};
 
     #[path = "../build.rs"]
     mod build;

@@ -12,7 +12,9 @@ use medial_run::record::{Record, Status};
 use medial_run::text::{counted, grouped, significant};
 
 use crate::comparison::{Comparison, Entry, reached};
-use crate::metric::{CENTRALITY, COMPLETENESS, HAUSDORFF, MIN_ANGLE, TOTAL_SECONDS, median};
+use crate::metric::{
+    Better, CENTRALITY, COMPLETENESS, HAUSDORFF, MIN_ANGLE, Metric, TOTAL_SECONDS, median,
+};
 use crate::statistics::{FEWEST, Pairs, Ratio, Sample};
 use crate::summary::{reference, topology};
 use crate::tables::{Cell, Column, Table};
@@ -129,7 +131,47 @@ fn at_count(comparison: &Comparison<'_>, level: usize, spheres: usize) -> Vec<Ve
     let mut rows: Vec<Vec<Cell>> = criterion_row(comparison, &error).into_iter().collect();
     rows.push(right_everywhere(comparison, level, &spheres));
     rows.extend(criterion_row(comparison, &triangles));
+    rows.extend(
+        comparison
+            .own_metrics()
+            .into_iter()
+            .filter_map(|metric| own_criterion(comparison, metric, level, &spheres)),
+    );
     rows
+}
+
+/// The row of a metric of the user whose values are all positive: others have no ratio.
+fn own_criterion(
+    comparison: &Comparison<'_>,
+    metric: &Metric,
+    level: usize,
+    spheres: &str,
+) -> Option<Vec<Cell>> {
+    let is_positive = comparison
+        .entries
+        .iter()
+        .filter(|entry| entry.level == level)
+        .filter_map(|entry| metric.of(entry.record))
+        .all(|v| v > 0.0);
+    let own = |entry: &Entry<'_>| metric.of(entry.record).filter(|_| entry.comparable());
+    let title = metric.title;
+    let criterion = match metric.better {
+        Better::Lower => Criterion {
+            title: format!("lowest {title} at {spheres}"),
+            values: values(comparison, Some(level), own),
+            text: |value| significant(value, 3),
+            of: "its value",
+        },
+        // Less must be better.
+        Better::Higher => Criterion {
+            title: format!("highest {title} at {spheres}"),
+            values: values(comparison, Some(level), |entry| Some(own(entry)?.recip())),
+            text: |value| significant(value.recip(), 3),
+            of: "its reciprocal",
+        },
+        Better::Neither => return None,
+    };
+    criterion_row(comparison, &criterion).filter(|_| is_positive)
 }
 
 /// The row of the medial mesh nearest to the axis that the surface implies, both ways.

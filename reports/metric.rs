@@ -4,32 +4,14 @@
 //! tables, the plots, the definitions on the page, the gates of `diff` and the output of `medial evaluate` follow from
 //! it. A new metric needs its computation in `medial::metrics` and one entry here.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Mutex, PoisonError};
+
 use medial::metrics::Evaluation;
+pub use medial_run::record::Better;
 use medial_run::record::Record;
 use medial_run::text::{grouped, significant};
 use serde::Serialize;
-
-/// The better direction of a number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Better {
-    /// Less is better.
-    Lower,
-    /// More is better.
-    Higher,
-    /// Neither: a size or a setting.
-    Neither,
-}
-
-impl Better {
-    /// Whether `a` is better than `b`.
-    pub(crate) fn prefers(self, a: f64, b: f64) -> bool {
-        match self {
-            Self::Lower => a < b,
-            Self::Higher => a > b,
-            Self::Neither => false,
-        }
-    }
-}
 
 /// How a number is averaged over meshes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,6 +74,8 @@ pub(crate) enum Digits {
 pub(crate) enum Value {
     Evaluation(fn(&Evaluation) -> Option<f64>),
     Record(fn(&Record) -> Option<f64>),
+    /// A metric of the user, by the key of the metric.
+    Own,
 }
 
 /// One number of a record.
@@ -124,6 +108,7 @@ impl Metric {
         let value = match self.value {
             Value::Evaluation(value) => value(record.evaluate.as_ref()?)?,
             Value::Record(value) => value(record)?,
+            Value::Own => record.own.get(self.key)?.value,
         };
         Some(self.times * value).filter(|value| value.is_finite())
     }
@@ -211,6 +196,28 @@ impl Metric {
         self.path = path;
         self
     }
+}
+
+/// The metrics of the user among some records, by name.
+pub(crate) fn own_metrics<'r>(records: impl Iterator<Item = &'r Record>) -> Vec<&'static Metric> {
+    static KNOWN: Mutex<BTreeMap<(String, String, Better), &'static Metric>> =
+        Mutex::new(BTreeMap::new());
+    let found: BTreeSet<(String, String, Better)> = records
+        .flat_map(|record| &record.own)
+        .map(|(name, own)| (name.clone(), own.unit.clone(), own.better))
+        .collect();
+    // Tables hold references for ever, as to the metrics of the program: each is made once.
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut made = |own: (String, String, Better)| {
+        *known.entry(own.clone()).or_insert_with(|| {
+            let (name, unit, better) = own;
+            let [name, unit] = [name, unit].map(|text| &*text.leak());
+            let kind = (better, Digits::Significant, Mean::Arithmetic);
+            let metric = Metric { times: 1.0, ..Metric::new(name, name, unit, kind, Value::Own) };
+            &*Box::leak(Box::new(metric))
+        })
+    };
+    found.into_iter().map(&mut made).collect()
 }
 
 type Measured = fn(&Evaluation) -> Option<f64>;

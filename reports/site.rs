@@ -168,10 +168,10 @@ impl Site<'_> {
             .number("requested", |entry| entry.record.simplify.level.to_string())
             .number("spheres", |entry| reached(entry.record).map(|n| grouped(n as u64)))
             .text("rank by Hausdorff", |entry| rank(entry));
-        let claimed = |entry: &&Entry<'_>| entry.record.simplify.own_seconds?.simplify;
-        if entries.iter().any(|entry| claimed(&entry).is_some()) {
+        let claimed = |entry: &Entry<'_>| entry.record.simplify.own_seconds?.simplify;
+        if entries.iter().any(|entry| claimed(entry).is_some()) {
             rows = rows.number("claimed time (s)", |entry| {
-                claimed(&entry).map(|seconds| TOTAL_SECONDS.format(seconds))
+                claimed(entry).map(|seconds| TOTAL_SECONDS.format(seconds))
             });
         }
         for metric in [&HAUSDORFF, &MEAN_ERROR, &MIN_ANGLE, &TOTAL_SECONDS] {

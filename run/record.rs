@@ -153,12 +153,57 @@ pub struct Record {
     /// Path of the resulting `.ma` file relative to the folder of the results, with `/`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub artifact: Option<String>,
+    /// Metrics of the user by name, which a report adds from a file of their own; never read with the record.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", skip_deserializing)]
+    pub own: BTreeMap<String, OwnValue>,
     /// The edition that holds this record, where it is a frozen one next to those of a store.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edition: Option<String>,
     /// Whether this program has another version of the method than the edition.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_other_version: bool,
+}
+
+/// A value of a metric of the user. As JSON the number alone.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(into = "f64")]
+pub struct OwnValue {
+    /// The number.
+    pub value: f64,
+    /// Its unit; may be empty.
+    pub unit: String,
+    /// Its better direction.
+    pub better: Better,
+}
+
+impl From<OwnValue> for f64 {
+    fn from(own: OwnValue) -> Self {
+        own.value
+    }
+}
+
+/// The better direction of a number.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Better {
+    /// Less is better.
+    #[default]
+    Lower,
+    /// More is better.
+    Higher,
+    /// Neither: a size or a setting.
+    Neither,
+}
+
+impl Better {
+    /// Whether `a` is better than `b`.
+    pub fn prefers(self, a: f64, b: f64) -> bool {
+        match self {
+            Self::Lower => a < b,
+            Self::Higher => a > b,
+            Self::Neither => false,
+        }
+    }
 }
 
 impl Record {

@@ -163,7 +163,7 @@ pub fn run(
     // Mesh by mesh from cheap to expensive, so that first results come soon.
     for scene in left.chunk_by_mut(|a, b| a.scene == b.scene) {
         let cost = |item: &Item| match item.method.id.as_str() {
-            GIVEN => 0.0,
+            GIVEN | INITIAL => 0.0,
             id => medial_methods::usual_seconds(id).unwrap_or(f64::INFINITY),
         };
         scene.sort_by(|a, b| cost(a).total_cmp(&cost(b)));

@@ -44,7 +44,8 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
     let inspected = match arguments.wrap {
         Some(alpha) => {
             let options = alpha.map_or_else(WrapOptions::default, WrapOptions::with_alpha);
-            surface::inspect_wrapped(&arguments.input, options)
+            surface::content(&arguments.input)
+                .and_then(|bytes| surface::inspect_wrapped(&arguments.input, &bytes, options))
         }
         None => surface::inspect(&arguments.input),
     };

@@ -17,7 +17,8 @@ use crate::args::Global;
 use crate::exit::{Exit, Failure};
 use crate::files;
 use crate::output::print_result;
-use crate::rebuild::{Rebuilt, STUDY, rebuild, records, write_study};
+use crate::own_metric::{self, OwnMetric, printed};
+use crate::rebuild::{Rebuilt, STUDY, measure_own, rebuild, records, write_study};
 use crate::store::{PAGE, RESULTS, Store, artifact_path, claim, entries_of};
 use crate::study::Study;
 use crate::study::registry::Registry;
@@ -34,6 +35,15 @@ pub struct Arguments {
     /// and mesh.
     #[arg(long, value_name = "DIR")]
     site: Option<PathBuf>,
+    /// Measure a number of your own on each saved result: `facets (mm), higher=python3 facets.py`. The program gets the files of
+    /// the surface and of the medial mesh, and prints the number.
+    #[arg(long, value_name = "METRIC=PROGRAM", value_parser = metric)]
+    metric: Vec<(OwnMetric, String)>,
+}
+
+fn metric(text: &str) -> Result<(OwnMetric, String), &'static str> {
+    let (metric, command) = text.split_once('=').ok_or("expected METRIC=PROGRAM")?;
+    Ok((metric.parse()?, command.to_owned()))
 }
 
 /// Runs the verb. Fails when the folder has no readable records, another process adds to it, or the report cannot be
@@ -48,6 +58,11 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         }
         (dirs, Some(out)) => (out, merge(dirs, out)?),
     };
+    let mut unmeasured = Vec::new();
+    for (metric, command) in &arguments.metric {
+        let value = printed(command).map_err(Failure::input)?;
+        unmeasured.extend(measure_own(dir, metric, value)?);
+    }
     // The site of a store leaves the store unchanged, which may be read-only.
     let is_read = arguments.site.is_some() && arguments.out.is_none();
     // While another process adds records, a page would be outdated at once.
@@ -68,7 +83,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         rebuilt.get_or_insert(of_site);
     }
     let Rebuilt { records, files, mut warnings, undrawn } = rebuilt.expect("one of the two");
-    warnings.extend(undrawn);
+    warnings.extend(undrawn.into_iter().chain(unmeasured));
     if held.as_ref().is_some_and(|store| store.was_cut) {
         warnings
             .push(format!("{RESULTS}: removed an incomplete last line; its item has no record"));
@@ -185,6 +200,8 @@ fn merge(dirs: &[PathBuf], out: &Path) -> Result<Vec<String>, Failure> {
     }
     let text = serde_json::to_vec(&header).map_err(Failure::input)?;
     files::write(&out.join("header.json"), &text)?;
+    let stores: Vec<&Path> = dirs.iter().map(PathBuf::as_path).collect();
+    own_metric::merge(&stores, out)?;
     drop(store);
     Ok(notes)
 }

@@ -13,13 +13,18 @@ use serde_json::json;
 
 use crate::exit::{Exit, Failure};
 use crate::files;
+use crate::own_metric::attach;
 use crate::provenance::provenance;
 use crate::store::{PAGE, RESULTS};
 use crate::study::Study;
 use crate::study::edition::Edition;
 use crate::study::registry::Registry;
 
+mod own;
 mod pictures;
+
+pub use own::measure_own;
+use pictures::inputs;
 
 /// The records of some items, in the order of the items.
 pub fn of_items(records: Vec<Record>, items: &[Item]) -> Vec<Record> {
@@ -91,6 +96,7 @@ fn write(
     mut header: Header,
 ) -> Result<Rebuilt, Failure> {
     // Tables follow the order of the records: that of the study, not that of the runs.
+    attach(dir, &mut records)?;
     let order = positions(items);
     records.sort_by_key(|record| order.get(&row_of(record)).copied().unwrap_or(usize::MAX));
     let study = Study::read(&dir.join(STUDY)).ok();

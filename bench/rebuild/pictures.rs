@@ -22,10 +22,7 @@ pub fn draw(dirs: [&Path; 2], records: &[Record], sources: &[Source]) -> Vec<Str
     if strips.is_empty() {
         return vec![];
     }
-    let inputs: BTreeMap<String, Input> = (sources.par_iter())
-        .filter_map(|source| Input::load(source).ok())
-        .map(|input| (input.hash.clone(), input))
-        .collect();
+    let inputs = inputs(sources);
     // Side by side: packing a picture takes one thread.
     (strips.par_iter())
         .filter_map(|wanted| {
@@ -35,6 +32,12 @@ pub fn draw(dirs: [&Path; 2], records: &[Record], sources: &[Source]) -> Vec<Str
             Some(format!("no pictures of {}: {why}", wanted.mesh))
         })
         .collect()
+}
+
+/// The inputs that can be read, by the hash of their contents.
+pub(crate) fn inputs(sources: &[Source]) -> BTreeMap<String, Input> {
+    let inputs = sources.par_iter().filter_map(|source| Input::load(source).ok());
+    inputs.map(|input| (input.hash.clone(), input)).collect()
 }
 
 fn draw_strip(

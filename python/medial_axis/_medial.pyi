@@ -34,6 +34,7 @@ class Surface:
         path: str,
         off: bytes | None,
         fill_holes: bool,
+        wrap: float | None,
         components: str,
         name: str | None,
         call: _Call,
@@ -128,6 +129,9 @@ def surface_from_parts(
 ) -> Surface: ...
 def results_row(record: str) -> str: ...
 def methods() -> str: ...
+def measure(
+    dir: str, metric: str, value: Callable[[Surface, str | os.PathLike[str]], float]
+) -> list[str]: ...
 def run_command(
     program: str, arguments: Sequence[str], code: str, words: Sequence[str]
 ) -> int: ...

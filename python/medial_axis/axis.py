@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import _medial
 from ._arguments import FloatArray, IndexArray, Progress, call, floats, indices, need, path_text, real, same, truths, whole
@@ -81,13 +82,14 @@ class MedialAxis:
 
     def __init__(
         self,
-        centres: Any,
-        radii: Any,
-        edges: Any = (),
-        faces: Any = (),
+        centres: ArrayLike,
+        radii: ArrayLike,
+        edges: ArrayLike = (),
+        faces: ArrayLike = (),
         *,
         mesh: Mesh | None = None,
     ) -> None:
+        """Checks and copies the arrays."""
         axis = _medial.Axis.from_arrays(
             floats(centres, "centres"),
             floats(radii, "radii", None),
@@ -196,7 +198,7 @@ class MedialAxis:
     def __len__(self) -> int:
         return len(self.radii)
 
-    def induced(self, keep: Any) -> MedialAxis:
+    def induced(self, keep: ArrayLike) -> MedialAxis:
         """Some of the spheres, with the edges and faces between them.
 
         Args:

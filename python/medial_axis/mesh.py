@@ -7,9 +7,10 @@ import os
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import _medial
-from ._arguments import FloatArray, IndexArray, Progress, call, floats, indices, need, path_text, same, whole
+from ._arguments import FloatArray, IndexArray, Progress, call, floats, indices, need, path_text, real, same, whole
 from .errors import InputError, ParameterError
 
 if TYPE_CHECKING:
@@ -49,13 +50,14 @@ class Mesh:
 
     def __init__(
         self,
-        vertices: Any,
-        faces: Any = None,
+        vertices: object,
+        faces: ArrayLike | None = None,
         *,
         name: str = "mesh",
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> None:
+        """Checks, repairs and orients the arrays."""
         if faces is None:
             vertices, faces = _foreign(vertices)
         self._surface = _medial.Surface.from_arrays(
@@ -99,10 +101,11 @@ class Mesh:
     @classmethod
     def repair(
         cls,
-        vertices: Any,
-        faces: Any = None,
+        vertices: object,
+        faces: ArrayLike | None = None,
         *,
         fill_holes: bool = False,
+        wrap: bool | float = False,
         components: str | int | float = "all",
         name: str | None = None,
         threads: int | None = None,
@@ -114,6 +117,8 @@ class Mesh:
             vertices: A file; or n x 3 positions, or a mesh of another package, as for `Mesh`.
             faces: m x 3 indices of vertices, from 0.
             fill_holes: Close holes by triangles between their vertices.
+            wrap: Replace the surface by a closed one around it, which also an open or non-manifold one has. A fraction of
+                the bounding-box diagonal, 0.01 for `True`: openings narrower than twice that are closed.
             components: Keep `all` parts, the `largest`, a number of the largest, or those with a share of the area below 1.
             name: Name in tables; by default the stem of the file.
             threads: Threads of a separate pool; by default all calls share one.
@@ -124,7 +129,7 @@ class Mesh:
 
         Raises:
             InputError: The surface still bounds no solid.
-            ParameterError: `components` is something else.
+            ParameterError: `components` or `wrap` is something else, or `fill_holes` and `wrap` are both given.
 
         Example:
             >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -132,6 +137,9 @@ class Mesh:
             >>> len(mesh.faces), mesh.report()["repairs"][0]["repair"]
             (4, 'filled_hole')
         """
+        alpha = {True: 0.01, False: None}[wrap] if isinstance(wrap, bool) else real(wrap, "wrap", 0.0, 1.0)
+        if alpha is not None and fill_holes:
+            raise ParameterError("wrap: a wrap has no holes to fill; leave out fill_holes")
         path, off = "mesh", None
         if faces is None and isinstance(vertices, (str, os.PathLike)):
             path = path_text(vertices)
@@ -142,6 +150,7 @@ class Mesh:
             path,
             off,
             bool(fill_holes),
+            alpha,
             str(components),
             None if name is None else str(name),
             call(0, threads, progress),
@@ -291,7 +300,7 @@ class Mesh:
         return MedialAxis._of(axis, self, remarks=remarks)
 
     def closest_points(
-        self, points: Any, *, threads: int | None = None
+        self, points: ArrayLike, *, threads: int | None = None
     ) -> tuple[FloatArray, FloatArray, IndexArray]:
         """The closest point of the surface for each of n points.
 
@@ -312,7 +321,7 @@ class Mesh:
         """
         return self._surface.closest_points(floats(points, "points"), call(0, threads))
 
-    def signed_distance(self, points: Any, *, threads: int | None = None) -> FloatArray:
+    def signed_distance(self, points: ArrayLike, *, threads: int | None = None) -> FloatArray:
         """The distance of each of n points to the surface: negative inside, with an exact sign.
 
         Args:
@@ -485,7 +494,7 @@ def _off(vertices: FloatArray, faces: IndexArray) -> bytes:
     return "\n".join(lines).encode() + b"\n"
 
 
-def _foreign(value: Any) -> tuple[Any, Any]:
+def _foreign(value: object) -> tuple[Any, Any]:
     """Vertices and triangles of an object of another package."""
     if isinstance(value, (tuple, list)) and len(value) == 2:
         return value[0], value[1]

@@ -9,6 +9,8 @@ import sys
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from numpy.typing import ArrayLike
+
 from . import _medial
 from ._arguments import BoolArray, FloatArray, IndexArray, floats
 from .axis import MedialAxis
@@ -156,7 +158,7 @@ class Shape:
         """
         return MedialAxis._of(self._handle.initial(), None)
 
-    def inside(self, points: Any) -> BoolArray:
+    def inside(self, points: ArrayLike) -> BoolArray:
         """Which of n points are inside.
 
         Args:
@@ -173,7 +175,7 @@ class Shape:
         """
         return self._handle.inside(floats(points, "points"))
 
-    def distances(self, points: Any) -> FloatArray:
+    def distances(self, points: ArrayLike) -> FloatArray:
         """The distances of n points to the surface.
 
         Args:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from numpy.typing import ArrayLike
+
 from . import _medial
 from ._arguments import FloatArray, IndexArray, Progress, call, floats
 from .axis import MedialAxis
@@ -23,8 +25,8 @@ class Triangulation(NamedTuple):
 
 
 def triangulate(
-    points: Any,
-    weights: Any = None,
+    points: ArrayLike,
+    weights: ArrayLike | None = None,
     *,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -57,7 +59,7 @@ def triangulate(
 
 
 def closest_points(
-    mesh: Mesh, points: Any, *, threads: int | None = None
+    mesh: Mesh, points: ArrayLike, *, threads: int | None = None
 ) -> tuple[FloatArray, FloatArray, IndexArray]:
     """The closest point of a surface for each of n points.
 
@@ -81,7 +83,7 @@ def closest_points(
     return _mesh(mesh).closest_points(points, threads=threads)
 
 
-def signed_distance(mesh: Mesh, points: Any, *, threads: int | None = None) -> FloatArray:
+def signed_distance(mesh: Mesh, points: ArrayLike, *, threads: int | None = None) -> FloatArray:
     """The distance of each of n points to a surface: negative inside, with an exact sign.
 
     Args:

@@ -15,7 +15,9 @@ use medial_run::reconstruct::union_boundary;
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::calls::{Call, Failure, Kind, Once, long, of_points, of_rows, points, triples};
+use crate::calls::{
+    Call, Failure, Kind, Once, advice_in_python, long, of_points, of_rows, points, triples,
+};
 use crate::surface::{Surface, shape_options};
 
 /// A medial mesh in input units, with its shape if that is known.
@@ -291,7 +293,9 @@ impl Axis {
             let (report, problem) = match surface::validate(&made) {
                 Ok(report) => (report, None),
                 // It can still be viewed and written.
-                Err(error) => (SurfaceReport::default(), Some(error.to_string())),
+                Err(error) => {
+                    (SurfaceReport::default(), Some(advice_in_python(&error.to_string())))
+                }
             };
             Ok((Surface::new(name, Loaded { mesh: made, report }, None), problem))
         })

@@ -195,10 +195,20 @@ pub struct Failure {
     message: String,
 }
 
+/// A message whose advice names calls of the package instead of commands.
+pub(crate) fn advice_in_python(message: &str) -> String {
+    let calls = [
+        ("medial repair --fill-holes", "Mesh.repair(..., fill_holes=True)"),
+        ("medial repair --wrap", "Mesh.repair(..., wrap=True)"),
+        ("--sampling conforming:N", "sampling=\"conforming:N\""),
+    ];
+    calls.iter().fold(message.to_owned(), |text, (command, call)| text.replace(command, call))
+}
+
 impl Failure {
     /// A failure of a kind.
     pub fn new(kind: Kind, message: impl ToString) -> Self {
-        Self { kind, message: message.to_string() }
+        Self { kind, message: advice_in_python(&message.to_string()) }
     }
 
     /// A failure of [`Kind::Input`].

@@ -23,12 +23,14 @@ use medial::geometry::delaunay::Delaunay;
 use medial::geometry::regular::Regular;
 use medial::geometry::triangulation::Triangulation;
 use medial_bench::host::Host;
-use medial_bench::main_hosted;
+use medial_bench::own_metric::OwnMetric;
+use medial_bench::{main_hosted, measure_own};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::calls::{Call, Failure, long, of_rows, points};
 use crate::method::Classes;
+use crate::surface::Surface;
 
 /// In the order of `_medial.pyi`.
 #[pymodule]
@@ -45,6 +47,7 @@ fn _medial(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(method::simplify, module)?)?;
     module.add_function(wrap_pyfunction!(picture::render, module)?)?;
     module.add_function(wrap_pyfunction!(picture::results_row, module)?)?;
+    module.add_function(wrap_pyfunction!(measure, module)?)?;
     module.add_function(wrap_pyfunction!(run_command, module)?)?;
     Ok(())
 }
@@ -61,6 +64,33 @@ fn run_command(
 ) -> u8 {
     let host = Host { program, arguments, code, words };
     py.detach(|| main_hosted(medial_methods::registry(), host, Box::new(Classes)) as u8)
+}
+
+/// Values of a metric of the user for the results of a store: `value` gets a surface and the file of a medial mesh. Returns
+/// remarks on results without a number; an exception of `value` ends it.
+#[pyfunction]
+fn measure(dir: PathBuf, metric: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
+    let metric: OwnMetric =
+        metric.parse().map_err(|why| Failure::parameter(format!("metric {metric}: {why}")))?;
+    let mut raised = None;
+    let remarks = measure_own(&dir, &metric, |saved| {
+        if raised.is_some() {
+            return Err("not measured".to_owned());
+        }
+        let loaded = medial::surface::read_triangles(&saved.surface.vertices, &saved.surface.faces);
+        let loaded = loaded.map_err(|error| error.to_string())?;
+        let given = Surface::new(saved.name.to_owned(), loaded, None);
+        let number = value.call1((given, saved.path)).and_then(|number| number.extract());
+        number.map_err(|error| {
+            let why = error.to_string();
+            raised = Some(error);
+            why
+        })
+    });
+    match raised {
+        Some(error) => Err(error),
+        None => Ok(remarks.map_err(|failure| Failure::input(failure.message))?),
+    }
 }
 
 /// Finite cells, hidden points, and pairs of a repeated point with the one that it repeats.

@@ -1,6 +1,6 @@
 //! A closed surface with its substrates, each built once.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use medial::complex::{DualTriangulation, MedialMesh};
@@ -8,7 +8,7 @@ use medial::metrics::{Judge, JudgeOptions};
 use medial::shape::{Shape, ShapeOptions};
 use medial::surface::{
     self, Components, InsideTest, Loaded, MendOptions, Normalisation, Sampling, SignedDistance,
-    SurfaceError, SurfaceReport, TriMesh, TriangleBvh,
+    SurfaceError, SurfaceReport, TriMesh, TriangleBvh, WrapOptions,
 };
 use medial_run::input::{Input, Source};
 use numpy::{PyArray1, PyReadonlyArray2};
@@ -165,6 +165,7 @@ impl Surface {
         path: PathBuf,
         off: Option<Vec<u8>>,
         fill_holes: bool,
+        wrap: Option<f64>,
         components: &str,
         name: Option<String>,
         call: Call,
@@ -177,12 +178,22 @@ impl Surface {
             monitor.at("repairing");
             let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             // Arrays come as the text of a file that has no name.
-            let loaded = match off {
-                Some(text) => surface::inspect_bytes("mesh.off", &text)
-                    .and_then(|found| found.mend(options))
-                    .map_err(|error| SurfaceError { file: None, ..error })?,
-                None => surface::inspect(&path)?.mend(options)?,
+            let is_array = off.is_some();
+            let (path, text) = match off {
+                Some(text) => (Path::new("mesh.off"), text),
+                None => (&*path, surface::content(&path)?),
             };
+            let inspected = match wrap {
+                Some(alpha) => {
+                    surface::inspect_wrapped(path, &text, WrapOptions::with_alpha(alpha))
+                }
+                None => surface::inspect_bytes(path, &text),
+            };
+            let loaded = inspected.and_then(|found| found.mend(options));
+            let loaded = loaded.map_err(|error| SurfaceError {
+                file: error.file.filter(|_| !is_array),
+                ..error
+            })?;
             Ok(Self::new(name.unwrap_or(stem), loaded, None))
         })
     }

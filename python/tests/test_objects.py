@@ -229,3 +229,42 @@ def test_what_is_known_of_methods() -> None:
     known = medial_axis.methods()
     assert known["qmat"]["params"][0]["name"] == "k"
     assert known["angle"]["native"]["unit"].startswith("degrees")
+
+
+def test_a_metric_of_the_user_is_a_column(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    report = medial_axis.compare("builtin:box", methods="qmat", spheres=[40, 20], out=tmp_path / "report", quiet=True)
+    seen = []
+
+    def radius(mesh: Mesh, axis: MedialAxis) -> float:
+        seen.append(mesh.name)
+        return float(axis.radii.mean() / mesh.diagonal)
+
+    assert report.add_metric("mean radius", radius, unit="diagonals", better="higher") == ()
+    assert seen and set(seen) == {"box"}
+    for _, row in report.frame().iterrows():
+        if not pandas.isna(row.artifact):
+            axis = MedialAxis.read(report.folder / row.artifact)
+            mesh = Mesh.read("builtin:box")
+            assert row["mean radius"] == pytest.approx(axis.radii.mean() / mesh.diagonal)
+    assert "mean radius (diagonals)" in (report.folder / "tables" / "mesh-box.md").read_text()
+    again = len(seen)
+    report.add_metric("mean radius", radius, unit="diagonals", better="higher")
+    assert len(seen) == again, "each result is measured once"
+    with pytest.raises(ZeroDivisionError):
+        report.add_metric("wrong", lambda mesh, axis: 1 / 0)
+    with pytest.raises(medial_axis.ParameterError, match="letters"):
+        report.add_metric("a/b", radius)
+
+
+def test_wrap_and_advice() -> None:
+    """An open surface is refused with advice in Python; a wrap closes it."""
+    corners, faces = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2]]
+    with pytest.raises(medial_axis.InputError, match=r"Mesh\.repair\(\.\.\., fill_holes=True\)"):
+        Mesh(corners, faces)
+    wrapped = Mesh.repair(corners, faces, wrap=0.05)
+    assert wrapped.report()["components"] == 1 and len(wrapped.faces) > 100
+    with pytest.raises(medial_axis.ParameterError, match="wrap"):
+        Mesh.repair(corners, faces, wrap=True, fill_holes=True)
+    with pytest.raises(medial_axis.ParameterError, match="wrap"):
+        Mesh.repair(corners, faces, wrap=-1.0)

@@ -143,6 +143,16 @@ def test_a_misspelt_option_fails_the_type_checker(tmp_path: Path) -> None:
     assert faulty == {number for number, line in enumerate(lines, 1) if line.endswith("# wrong")}, done.stdout
 
 
+def test_the_documented_class_passes_the_type_checker(tmp_path: Path) -> None:
+    pytest.importorskip("mypy")
+    page = Path(__file__).parent.parent.parent / "docs" / "python.md"
+    [example] = re.findall(r"```python\n((?:(?!```).)*?\nclass .*?)```", page.read_text(), re.DOTALL)
+    (tmp_path / "largest.py").write_text(example)
+    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path), "largest.py"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout
+
+
 @pytest.mark.parametrize("id", sorted(medial_axis.methods()))
 def test_every_word_of_a_type_is_a_value(id: str, axis: MedialAxis) -> None:
     """A word that the method does not know would be a `ParameterError`."""

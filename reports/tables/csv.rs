@@ -27,7 +27,7 @@ const LAST: &str = "diagonal evaluation_seed evaluate_seconds betti_0 betti_1 be
 
 /// Beginnings of paths that are no part of a column's name, and their replacement. The first one
 /// that fits counts.
-const NAMES: [(&str, &str); 10] = [
+const NAMES: [(&str, &str); 11] = [
     ("evaluate/seed", "evaluation_seed"), // `seed` is the method's
     ("evaluate/quality/", ""),
     ("evaluate/counts/", ""),
@@ -37,6 +37,7 @@ const NAMES: [(&str, &str); 10] = [
     ("simplify/substrates/", "substrate_"),
     ("simplify/", ""),
     ("item/machine/", ""),
+    ("item/own/", ""),
     ("item/", ""),
 ];
 

@@ -13,6 +13,7 @@ mod faults;
 mod history;
 mod hostile;
 mod layers;
+mod own_metric;
 mod plugin;
 mod plugin_output;
 mod process_tree;

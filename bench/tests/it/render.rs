@@ -25,7 +25,7 @@ fn every_kind_of_picture_is_written() {
         ("coarse.ma --color plain --camera -1,0,0.5 --background transparent", [160, 120]),
         ("coarse.ma --show reconstruction --tolerance 0.03", [160, 120]),
         ("coarse.ma --show error --tolerance 0.03 --max-error 0.02", [160, 120]),
-        ("coarse.ma fine.ma --show error --tolerance 0.03", [412, 280]),
+        ("coarse.ma fine.ma --show error --tolerance 0.03", [448, 280]),
     ] {
         let line = format!("render builtin:torus {words} -o x.png --size 160x120");
         let (code, object) = at.json(&line);

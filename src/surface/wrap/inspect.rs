@@ -9,7 +9,7 @@ use super::super::format::{self, Format};
 use super::super::inside::{InsideTest, Side};
 use super::super::mesh::Unit;
 use super::super::report::{Fault, Repair};
-use super::super::{Inspection, SurfaceError, TriMesh, content, in_file, repair};
+use super::super::{Inspection, SurfaceError, TriMesh, in_file, repair};
 use super::wrap;
 use crate::Vec3;
 use crate::geometry::trees::Bounds;
@@ -48,14 +48,14 @@ const FARTHEST_TOLERANCE: f64 = 0.01;
 /// manifold, one-sided, or a soup of triangles. The last repair in the report describes the wrap.
 ///
 /// # Errors
-/// When the file cannot be read, has no vertex or one that is not finite, and where [`wrap`] fails.
+/// When the bytes are no file of that name, there is no vertex or one that is not finite, and where [`wrap`] fails.
 pub fn inspect_wrapped(
     path: impl AsRef<Path>,
+    bytes: &[u8],
     options: WrapOptions,
 ) -> Result<Inspection, SurfaceError> {
     let path = path.as_ref();
-    let format = Format::of(path).map_err(|fault| in_file(path, fault))?;
-    let wrapped = wrapped(&content(path)?, format, options);
+    let wrapped = Format::of(path).and_then(|format| wrapped(bytes, format, options));
     let mut inspection = wrapped.map_err(|fault| in_file(path, fault))?;
     inspection.file = Some(path.to_owned());
     Ok(inspection)
