@@ -346,8 +346,11 @@ impl Simplification for RankedFacets {
         let reached = mesh.spheres.len();
         match level {
             Level::Spheres(requested) if reached != requested => diagnostics.warn(format!(
-                "{reached} spheres instead of {requested}: whole facets are kept, {} in all",
-                if kept.len() == self.set.facets.len() { "and these are" } else { "the best" }
+                "{reached} spheres instead of {requested}: {}",
+                match kept.len() == self.set.facets.len() {
+                    true => "all facets together have no more",
+                    false => "whole facets are kept, and the next one has several spheres",
+                }
             )),
             _ if reached == 0 => diagnostics.warn(format!(
                 "no facet passes {} = {native}: the largest is {}",

@@ -139,7 +139,7 @@ impl Scaled {
         if found != self.union_betti {
             diagnostics.warn(format!(
                 "the axis has Betti numbers {found:?}, the union of grown balls {:?}: rounding left \
-                 {open} facets open and {doubtful} groups of vertices in doubt",
+                 {open} facets and {doubtful} groups of vertices undecided",
                 self.union_betti
             ));
         }

@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         ([dir], None) => (dir, Vec::new()),
         (_, None) => {
             return Err(Failure::usage(
-                "several stores: no folder for the merged one; give --out DIR",
+                "several folders: name the one to merge them into with --out DIR",
             ));
         }
         (dirs, Some(out)) => (out, merge(dirs, out)?),
@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         // Somebody else's index.html must not be replaced.
         let is_empty = fs::read_dir(site).map_or(true, |mut files| files.next().is_none());
         if !is_empty && !site.join("results.csv.gz").exists() {
-            return Err(Failure::at(site, "not empty and no earlier site (expected a new folder)"));
+            return Err(Failure::at(site, "neither empty nor a site of medial; name a new folder"));
         }
         let of_site = rebuild(dir, Some(site), registry)?;
         rebuilt.get_or_insert(of_site);

@@ -127,7 +127,7 @@ impl<'a> Supervisor<'a> {
                 }
                 Attempt::Ended(Stage::Simplifying(reached), fault) => {
                     let at = part.levels[reached];
-                    let reason = format!("not run: the method ended its worker at {at}");
+                    let reason = format!("not run: the method ended its process at {at}");
                     let not_run = Fault { reason, ..fault.clone() };
                     let mut before = Vec::new();
                     for level in &missing {

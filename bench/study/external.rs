@@ -108,10 +108,7 @@ impl Claims {
     fn fault(&self) -> Option<String> {
         let seconds = self.seconds.iter().find(|(_, s)| !(s.is_finite() && **s >= 0.0));
         if let Some((name, value)) = seconds {
-            return Some(format!(
-                "seconds of {}: {value} is no time (expected a number from 0)",
-                quoted(name)
-            ));
+            return Some(format!("seconds of {}: {value}: expected a number from 0", quoted(name)));
         }
         let entry = self.bibtex.trim();
         // The depth of braces is 0 again at the last one alone: a second entry follows no other.

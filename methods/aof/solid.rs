@@ -446,9 +446,8 @@ impl Solid<'_> {
             ));
         }
         if !has_coarse {
-            base.diagnostics.warn(
-                "starts with fine voxels instead of coarse ones: the solid has no coarse voxel",
-            );
+            base.diagnostics
+                .warn("started with fine voxels: the solid is too thin for a coarse one");
         }
         Ok(base)
     }

@@ -354,7 +354,7 @@ impl PreparedCover<'_> {
         }
         let Some((balls, error, diagnostics)) = held else {
             return Err(SimplifyError::Level(format!(
-                "no {MOST} spheres are within {bound} of the diagonal: the least error was {least:.3e}"
+                "{MOST} spheres do not reach {bound} of the diagonal: the smallest error was {least:.3e}"
             )));
         };
         self.finished(Level::Native(bound), &balls, error, diagnostics)

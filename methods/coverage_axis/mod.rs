@@ -207,8 +207,8 @@ impl Axis {
         if reached > cover.bound {
             let gap = 100.0 * (reached - cover.bound) as f64 / reached as f64;
             diagnostics.warn(format!(
-                "{reached} spheres cover, and no cover has fewer than {}: the search ended at a gap of \
-                 {gap:.1} %",
+                "found a cover of {reached} spheres, the smallest one has at least {}: the search ended at a \
+                 gap of {gap:.1} %",
                 cover.bound
             ));
         }

@@ -187,9 +187,9 @@ impl Simplification for PreparedHem {
             Level::Native(epsilon) if epsilon >= 0.0 && epsilon.is_finite() => {
                 self.at_bound(epsilon)
             }
-            Level::Native(epsilon) => {
-                Err(SimplifyError::Level(format!("epsilon = {epsilon:?} is not a distance")))
-            }
+            Level::Native(epsilon) => Err(SimplifyError::Level(format!(
+                "epsilon = {epsilon:?}: expected a number from 0"
+            ))),
             Level::Published => self.as_published(),
         }
     }
@@ -229,8 +229,8 @@ impl PreparedHem {
             Found::None { best, error, measured } => {
                 let spheres = self.initial.spheres.len();
                 return Err(SimplifyError::Level(format!(
-                    "epsilon = {epsilon} is held by none of the {measured} levels that were measured, from \
-                     {spheres} spheres to {}: the best, of {} spheres, is {error:.3e} of the diagonal off a sample",
+                    "epsilon = {epsilon}: no result among {measured}, from {spheres} spheres to {}, is within it; the \
+                     best one, with {} spheres, is {error:.3e} diagonals away from a sample",
                     spheres - record.len(),
                     spheres - best
                 )));
@@ -250,8 +250,8 @@ impl PreparedHem {
         let mut diagnostics = self.diagnostics();
         if error > PUBLISHED {
             diagnostics.warn(format!(
-                "no collapse cost more than {PUBLISHED}, as in the authors' code, but a sample is \
-                 {error:.3e} of the diagonal off the result"
+                "no collapse cost more than {PUBLISHED}, as in the authors' code, but the result is \
+                 {error:.3e} diagonals away from a sample"
             ));
         }
         checked(Level::Published, mesh, Some(PUBLISHED), diagnostics)

@@ -153,8 +153,7 @@ impl Levels {
                 spheres - stage
             )),
             Level::Published => diagnostics.warn(format!(
-                "the paper leaves the scale to the user (1.18 to 17.38 in its Table 1); this is \
-                 s = {PUBLISHED}"
+                "the paper names no default scale (its Table 1 has 1.18 to 17.38); used s = {PUBLISHED}"
             )),
             _ => {}
         }

@@ -96,8 +96,8 @@ pub fn method() -> Method<QmatParams> {
              each merged sphere placed where its error is least.",
         )
         .published(
-            "100 spheres, the topology kept from 200 spheres on: the paper leaves the count to the \
-             user, its Table II compares at 100",
+            "100 spheres, the topology kept from 200 spheres on: the paper names no default count, \
+             its Table II compares at 100",
         )
         .params(QmatParams::describe());
     Method::new(info, prepare)
@@ -130,7 +130,7 @@ impl Simplification for PreparedQmat {
             Level::Spheres(count) => count,
             Level::Published => {
                 diagnostics.warn(format!(
-                    "the paper leaves the count to the user; {PUBLISHED} spheres as in its Table II"
+                    "the paper names no default count; used {PUBLISHED} spheres as in its Table II"
                 ));
                 PUBLISHED
             }

@@ -135,7 +135,7 @@ fn of_union(shape: &Shape, run: &RunContext, diagnostics: &mut Diagnostics) -> R
     if found != union.union_betti() {
         diagnostics.warn(format!(
             "the axis has Betti numbers {found:?}, the union of balls {:?}: rounding left {} facets \
-             open and {} groups of vertices in doubt",
+             and {} groups of vertices undecided",
             union.union_betti(),
             union.tally().open,
             union.tally().doubtful

@@ -209,8 +209,8 @@ impl PreparedTight {
         let reached = descent.mesh.spheres.len();
         if reached > count {
             diagnostics.warn(format!(
-                "{reached} spheres instead of {count}: no edge is left whose collapse keeps the \
-                 homotopy type and folds no face"
+                "{reached} spheres instead of {count}: each further collapse would \
+                 change the topology or fold a face"
             ));
         }
         let fewer = fewer.filter(|_| reached == count);
@@ -320,8 +320,8 @@ fn bounded(spheres: usize) -> Result<()> {
         return Ok(());
     }
     Err(SimplifyError::unsupported(format!(
-        "{spheres} spheres to begin with; `tight` places at most {MOST} together; request fewer, or \
-         simplify them by another method first"
+        "`tight` places at most {MOST} spheres (found {spheres}); request fewer, or simplify by another \
+         method first"
     )))
 }
 
@@ -874,8 +874,8 @@ impl Within<'_> {
         }
         within.ok_or_else(|| {
             SimplifyError::Level(format!(
-                "no state within {bound} of the diagonal was found: the least two-sided error was {least:.3e}, \
-                 with up to {finest} spheres"
+                "no result within {bound} of the diagonal: the smallest error was {least:.3e}, with up to \
+                 {finest} spheres"
             ))
         })
     }

@@ -200,7 +200,7 @@ impl PreparedVmas<'_> {
     }
 }
 
-/// Why there are fewer spheres than requested, or the error is not at rest.
+/// Why there are fewer spheres than requested, or the error still changed at the end.
 fn explain(
     requested: usize,
     target: usize,
@@ -216,10 +216,10 @@ fn explain(
         };
         diagnostics.warn(format!("{instead}: {why}"));
     } else if target < requested {
-        diagnostics
-            .warn(format!("{instead}: more than {target} need more surface points than there are"));
+        diagnostics.warn(format!("{instead}: more need more surface points than there are"));
     } else if ended == Ended::IterationLimit {
-        diagnostics.warn("the limit of rounds was reached, and the error is not at rest");
+        diagnostics
+            .warn("stopped at the limit of rounds (iterations) while the error still changed");
     }
 }
 

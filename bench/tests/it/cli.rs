@@ -186,7 +186,11 @@ fn wrong_and_absurd_requests_are_refused_at_once() {
         // With a suggestion.
         ("simplify builtin:sphere:8 -m qmat --max-error 5", 2, "write 0.05 for 5 %"),
         ("simplify builtin:sphere:8 -m qmat --max-error 1", 2, "write 0.01 for 1 %"),
-        ("simplify builtin:sphere:8 -m hem --level inf -o x.ma", 2, "inf is not a distance"),
+        (
+            "simplify builtin:sphere:8 -m hem --level inf -o x.ma",
+            2,
+            "inf: expected a number from 0",
+        ),
         ("simplify builtin:sphere:8 -m qmta", 2, "did you mean `qmat`?"),
         ("simplify builtin:sphere:8 --level 60", 2, "no method: name one with --method ID"),
         ("simplify builtin:sphere:8", 2, "request --spheres N or --max-error E"),

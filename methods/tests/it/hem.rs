@@ -41,7 +41,7 @@ fn a_bound_holds_for_every_sample() {
                 Err(refused) => {
                     // The initial mesh is measured before a bound is refused.
                     assert!(least > epsilon, "{id}: {refused}");
-                    assert!(refused.to_string().contains("the best, of "), "{refused}");
+                    assert!(refused.to_string().contains("the best one, with "), "{refused}");
                     continue;
                 }
                 Ok(result) => result,
