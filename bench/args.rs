@@ -186,6 +186,11 @@ fn number(text: &str, is_wanted: fn(f64) -> bool, expected: &str) -> Result<f64,
     number.ok_or_else(|| format!("expected {expected}"))
 }
 
+/// Reads a number of spheres; its range is checked by the method.
+pub fn whole(text: &str) -> Result<usize, &'static str> {
+    text.trim().parse().map_err(|_| "expected a whole number")
+}
+
 /// Reads `KEY=VALUE`.
 pub fn key_value(text: &str) -> Result<(String, String), String> {
     let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE")?;

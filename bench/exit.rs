@@ -45,7 +45,13 @@ pub struct Failure {
 impl Failure {
     /// The user's input is wrong.
     pub fn input(message: impl ToString) -> Self {
-        Self { code: Exit::Input, message: message.to_string() }
+        // Rust adds the number of an error of the system to its words.
+        let mut message = message.to_string();
+        while let Some(start) = message.find(" (os error ") {
+            let end = message[start..].find(')').map_or(message.len(), |end| start + end + 1);
+            message.replace_range(start..end, "");
+        }
+        Self { code: Exit::Input, message }
     }
 
     /// The command line is wrong.

@@ -50,7 +50,7 @@ pub fn check_output(output: Option<&Path>) -> Result<(), Failure> {
 }
 
 /// Extensions of surfaces that are written.
-pub const SURFACES: [&str; 3] = ["ply", "off", "obj"];
+pub const SURFACES: [&str; 4] = ["ply", "off", "obj", "stl"];
 
 /// Refuses a file of a kind that is not written.
 pub fn check_extension(path: &Path, known: &[&str]) -> Result<(), Failure> {

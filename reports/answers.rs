@@ -37,6 +37,9 @@ const RANKED: f64 = 5.0;
 /// The quantity of the criterion whose values are in the column of the time.
 const TIME: &str = "its time";
 
+/// The quantity of a criterion where more is better. The ratio of two is that of the values, the runner-up's to the best.
+const RECIPROCAL: &str = "its reciprocal";
+
 /// For each mesh the least value of a method; `None` where the method did not run.
 pub(crate) type Values = Vec<Option<Found>>;
 
@@ -167,7 +170,7 @@ fn own_criterion(
             title: format!("highest {title} at {spheres}"),
             values: values(comparison, Some(level), |entry| Some(own(entry)?.recip())),
             text: |value| significant(value.recip(), 3),
-            of: "its reciprocal",
+            of: RECIPROCAL,
         },
         Better::Neither => return None,
     };
@@ -355,7 +358,11 @@ fn row_of(comparison: &Comparison<'_>, criterion: &Criterion, ranks: &[Rank]) ->
     let mut cells = vec![
         Cell::from(criterion.title.clone()),
         Cell { best: true, ..Cell::from(comparison.series[first].as_str()) },
-        Cell::from(ranks[0].median.filter(|_| !is_time).map(criterion.text)),
+        Cell::from(
+            ranks[0]
+                .median
+                .map(|median| (criterion.text)(median) + if is_time { " s" } else { "" }),
+        ),
         Cell::from(match is_time {
             true => ranks[0].median.map(criterion.text),
             false => seconds.map(|seconds| significant(seconds, 3)),
@@ -365,7 +372,10 @@ fn row_of(comparison: &Comparison<'_>, criterion: &Criterion, ranks: &[Rank]) ->
     let runner_up = ranks.get(1).map(|rank| rank.series);
     let pair = runner_up.and_then(|second| pairs.between(first, second));
     let ratio = pair.as_ref().and_then(|pair| pair.ratio);
-    let ratio = ratio.map(|ratio| format!("{} of {}", ratio.text(2), criterion.of));
+    let ratio = ratio.map(|ratio| match criterion.of {
+        RECIPROCAL => format!("{} of this value", ratio.text(2)),
+        of => format!("{} of {of}", ratio.text(2)),
+    });
     cells.extend([
         Cell::from(runner_up.map_or("no other", |second| comparison.series[second].as_str())),
         Cell::from(ratio),

@@ -7,7 +7,9 @@ use medial_run::level::Target;
 use medial_run::record::{Record, Status, is_near};
 use medial_run::text::{counted, grouped, printable, trimmed};
 
-use crate::metric::{COMPARED, FROZEN_SECONDS, HAUSDORFF, Metric, TIME_SPREAD, own_metrics};
+use crate::metric::{
+    CLAIMED_SECONDS, COMPARED, FROZEN_SECONDS, HAUSDORFF, Metric, TIME_SPREAD, own_metrics,
+};
 
 /// Every record that counts, by mesh, series and level.
 pub(crate) struct Comparison<'a> {
@@ -207,13 +209,12 @@ impl<'a> Comparison<'a> {
         Some(note)
     }
 
-    /// The columns of tables: [`COMPARED`], with the spread of repeated times, the seconds of an edition and the metrics of the
-    /// user if there are any.
+    /// The columns of tables: [`COMPARED`], with the spread of repeated times, the seconds of an edition, claimed seconds and the
+    /// metrics of the user if there are any.
     pub(crate) fn columns(&self) -> Vec<&'static Metric> {
-        let frozen = self.entries.iter().any(|entry| entry.record.edition.is_some());
-        let spread = self.entries.iter().any(|entry| TIME_SPREAD.of(entry.record).is_some());
-        let times = [(spread, &TIME_SPREAD), (frozen, &FROZEN_SECONDS)];
-        let times = times.into_iter().filter_map(|(is_shown, metric)| is_shown.then_some(metric));
+        let has_any =
+            |metric: &&Metric| self.entries.iter().any(|entry| metric.of(entry.record).is_some());
+        let times = [&TIME_SPREAD, &FROZEN_SECONDS, &CLAIMED_SECONDS].into_iter().filter(has_any);
         COMPARED.into_iter().chain(times).chain(self.own_metrics()).collect()
     }
 

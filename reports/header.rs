@@ -115,10 +115,13 @@ impl Header {
                 entries.push(entry.to_owned()); // in the order of the methods
             }
         }
-        let version = self.runs.last().map_or("", |run| &run.version);
+        let last = self.runs.last();
+        let version = last.map_or("", |run| &run.version);
+        let date = last.and_then(|run| run.date.as_deref()).unwrap_or_default();
+        let year = date.get(..4).map_or(String::new(), |year| format!("\n  year = {{{year}}},"));
         entries.push(format!(
             "@misc{{medial,\n  title = {{medial: a reference harness for simplifying the 3D medial \
-             axis transform}},\n  author = {{{{The medial developers}}}},\n  url = \
+             axis transform}},\n  author = {{{{The medial developers}}}},{year}\n  url = \
              {{https://github.com/medial-rs/medial}},\n  note = {{Version {version}}}\n}}"
         ));
         entries.join("\n\n") + "\n"

@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 
 use medial::metrics::Evaluation;
 pub use medial_run::record::Better;
-use medial_run::record::Record;
+use medial_run::record::{Record, Status};
 use medial_run::text::{grouped, significant};
 use serde::Serialize;
 
@@ -414,6 +414,18 @@ pub(crate) const FROZEN_SECONDS: Metric = Metric::new(
     "s",
     (Better::Lower, Digits::Significant, GEOMETRIC),
     Value::Record(|record| Some(record.frozen_seconds()?.total)),
+)
+.neutral();
+
+/// The seconds that external results claim, in a column of their own next to [`TOTAL_SECONDS`]; in no other table or plot.
+pub(crate) const CLAIMED_SECONDS: Metric = Metric::new(
+    "claimed_seconds",
+    "claimed time",
+    "s",
+    (Better::Lower, Digits::Significant, GEOMETRIC),
+    Value::Record(|record| {
+        record.simplify.own_seconds?.simplify.filter(|_| record.status == Status::External)
+    }),
 )
 .neutral();
 

@@ -9,7 +9,8 @@ use crate::answers::{equal_error_table, usual_level};
 use crate::comparison::{Comparison, reached, row_name};
 use crate::header::MethodNote;
 use crate::metric::{
-    FROZEN_SECONDS, HAUSDORFF, MEAN_ERROR, Mean, Metric, TIME_SPREAD, TOTAL_SECONDS,
+    CLAIMED_SECONDS, FROZEN_SECONDS, HAUSDORFF, MEAN_ERROR, Mean, Metric, TIME_SPREAD,
+    TOTAL_SECONDS,
 };
 use crate::summary::{CountSummary, SeriesSummary, by_count};
 use crate::tables::{Cell, Table};
@@ -62,6 +63,7 @@ pub(crate) fn overview_table(
         .number("seconds", |row| mean(row, &TOTAL_SECONDS))
         .number("spread %", |row| mean(row, &TIME_SPREAD))
         .number("frozen s", |row| mean(row, &FROZEN_SECONDS))
+        .number("claimed s", |row| mean(row, &CLAIMED_SECONDS))
         .text("best suited for", |row| {
             let note = methods.iter().find(|note| note.id == comparison.methods[row.series]);
             note.and_then(MethodNote::briefly).unwrap_or_default()
@@ -76,7 +78,8 @@ pub(crate) fn overview_table(
     }
     let edition = comparison.edition_note();
     let has = |metric: &Metric| comparison.columns().iter().any(|column| column.key == metric.key);
-    let times = [("spread %", TIME_SPREAD), ("frozen s", FROZEN_SECONDS)];
+    let times =
+        [("spread %", TIME_SPREAD), ("frozen s", FROZEN_SECONDS), ("claimed s", CLAIMED_SECONDS)];
     let missing_times = times.iter().filter(|(_, metric)| !has(metric)).map(|(title, _)| *title);
     let table = table.without(&missing_times.collect::<Vec<_>>());
     if has(&TIME_SPREAD) {

@@ -13,7 +13,7 @@ use medial_run::text::{escape_html, file_stems, grouped};
 
 use crate::comparison::{Comparison, Entry, reached};
 use crate::header::{Header, MethodNote, method_pages};
-use crate::metric::{HAUSDORFF, MEAN_ERROR, MIN_ANGLE, TOTAL_SECONDS};
+use crate::metric::{CLAIMED_SECONDS, HAUSDORFF, MEAN_ERROR, MIN_ANGLE, Metric, TOTAL_SECONDS};
 use crate::pictures::{PictureStrip, strips};
 use crate::render::Layout;
 use crate::tables::{Table, mesh_table, to_html, topology_word};
@@ -168,13 +168,9 @@ impl Site<'_> {
             .number("requested", |entry| entry.record.simplify.level.to_string())
             .number("spheres", |entry| reached(entry.record).map(|n| grouped(n as u64)))
             .text("rank by Hausdorff", |entry| rank(entry));
-        let claimed = |entry: &Entry<'_>| entry.record.simplify.own_seconds?.simplify;
-        if entries.iter().any(|entry| claimed(entry).is_some()) {
-            rows = rows.number("claimed time (s)", |entry| {
-                claimed(entry).map(|seconds| TOTAL_SECONDS.format(seconds))
-            });
-        }
-        for metric in [&HAUSDORFF, &MEAN_ERROR, &MIN_ANGLE, &TOTAL_SECONDS] {
+        let metrics = [&HAUSDORFF, &MEAN_ERROR, &MIN_ANGLE, &TOTAL_SECONDS, &CLAIMED_SECONDS];
+        let has_any = |metric: &&&Metric| entries.iter().any(|e| metric.of(e.record).is_some());
+        for metric in metrics.iter().filter(has_any) {
             rows = rows.number(metric.heading(), |entry| {
                 metric.of(entry.record).map(|value| metric.format(value))
             });

@@ -22,8 +22,8 @@ three() {
 three bracket 0.01
 three blob 0.004
 
-for mood in outside inside balanced; do
-    "$medial" simplify builtin:bracket --method cover --spheres 32 --set mood=$mood -o "$work/$mood.yaml"
+for fit in outside inside balanced; do
+    "$medial" simplify builtin:bracket --method cover --spheres 32 --set fit=$fit -o "$work/$fit.yaml"
 done
 "$medial" render builtin:bracket "$work/outside.yaml" "$work/inside.yaml" "$work/balanced.yaml" \
     --show error --max-error 0.05 --size 262x200 -o "$folder/spheres.png"

@@ -10,7 +10,7 @@ use medial_run::item::{GIVEN, Item};
 use medial_run::record::{Record, Status};
 use serde_json::json;
 
-use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments};
+use crate::args::{Global, MeasureArguments, MeshArgument, SubstrateArguments, whole};
 use crate::exec::Supervisor;
 use crate::exec::queue::{Contender, count, missing, refused_params, run_items};
 use crate::exit::{Exit, Failure};
@@ -44,7 +44,7 @@ pub struct Arguments {
     #[arg(long, value_name = "ID", value_delimiter = ',')]
     without: Vec<String>,
     /// Simplify to these sphere counts [default: 200,100,50; 100,50 without a mesh].
-    #[arg(long, value_name = "COUNTS", value_delimiter = ',')]
+    #[arg(long, value_name = "COUNTS", value_delimiter = ',', allow_negative_numbers = true, value_parser = whole)]
     spheres: Vec<usize>,
     /// Run method ID at these native levels instead of its default sweep; repeatable.
     #[arg(long, value_name = "ID=X,Y")]
@@ -292,7 +292,11 @@ impl Arguments {
             let before = study.methods.len();
             study.methods.retain(|row| row.id != *id);
             if study.methods.len() == before {
-                return Err(Failure::usage(format!("--without {id}: no method with this id runs")));
+                let why = match registry.entry(id) {
+                    Some(_) => format!("`{id}` does not run by default"),
+                    None => registry.no_such(id),
+                };
+                return Err(Failure::usage(format!("--without: {why}")));
             }
         }
         if study.methods.iter().all(|row| row.id == INITIAL) {

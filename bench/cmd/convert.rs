@@ -43,7 +43,9 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         Some(&arguments.to),
         [from.as_path()].into_iter().chain(arguments.look.mesh.as_deref()),
     )?;
-    let (notes, vertices, faces) = if is_medial(from).map_err(|error| Failure::at(from, error))? {
+    let (notes, [points, faces], noun) = if is_medial(from)
+        .map_err(|error| Failure::at(from, error))?
+    {
         arguments.look.check(&arguments.to)?;
         let Arguments { lenient, block, .. } = *arguments;
         let options = AxisOptions { lenient, block, ..AxisOptions::default() };
@@ -51,7 +53,7 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         complex::write_with(&arguments.to, &loaded.mesh, &look).map_err(Failure::input)?;
         let (mesh, mut notes) = loaded.with_remarks();
         notes.extend(left_out(&arguments.to, &mesh));
-        (notes, mesh.spheres.len(), mesh.faces.len())
+        (notes, [mesh.spheres.len(), mesh.faces.len()], "sphere")
     } else if arguments.look.is_set() {
         let from = arguments.from.display();
         return Err(Failure::usage(format!(
@@ -78,12 +80,13 @@ pub fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Failure> {
         let mut notes: Vec<String> =
             loaded.report.repairs.iter().map(ToString::to_string).collect();
         notes.extend(loaded.report.warnings);
-        (notes, loaded.mesh.vertices.len(), loaded.mesh.faces.len())
+        (notes, [loaded.mesh.vertices.len(), loaded.mesh.faces.len()], "vertex")
     };
-    let object = json!({ "output": arguments.to, "vertices": vertices, "faces": faces });
-    let [vertices, faces] =
-        [(vertices, "vertex"), (faces, "face")].map(|(count, noun)| counted(count as u64, noun));
-    let text = format!("{}: {vertices}, {faces}", arguments.to.display());
+    let object = json!({ "output": arguments.to, "vertices": points, "faces": faces });
+    let mut text = format!("{}: {}", arguments.to.display(), counted(points as u64, noun));
+    if !complex::holds_spheres_alone(&arguments.to) {
+        text += &format!(", {}", counted(faces as u64, "face"));
+    }
     Ok(print_result(global, &object, &text, &notes))
 }
 

@@ -245,7 +245,7 @@ fn described(evaluation: &Evaluation, diagonal: f64, all: bool) -> String {
         }
         return text + "\n  all metrics: --all";
     }
-    text += "\n  lengths: in % of the diagonal, and in the unit of the mesh";
+    text += &line("", "%          unit of the mesh, of lengths");
     let mut add = |name: &str, value: &str| text += &line(name, value);
     rows.iter().for_each(|row| add(&row.title, &cells(row)));
     add("Betti numbers", &betti);

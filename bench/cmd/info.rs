@@ -3,7 +3,7 @@
 use clap::Args;
 use medial::surface::{self, Loaded, SurfaceReport};
 use medial_run::input::{Input, Source};
-use medial_run::text::significant;
+use medial_run::text::{counted, significant};
 
 use crate::args::{Global, MeshArgument};
 use crate::exit::{Exit, Failure};
@@ -58,7 +58,9 @@ fn print_report(report: &SurfaceReport) {
     let yes = |flag: bool| if flag { "yes" } else { "no" };
     let intersecting = match report.intersecting_pairs {
         0 => "none".to_owned(),
-        pairs if report.intersecting_pairs_complete => format!("{pairs} pairs of faces"),
+        pairs if report.intersecting_pairs_complete => {
+            counted(pairs, "pair of faces", "pairs of faces")
+        }
         pairs => format!("more than {pairs} pairs of faces"),
     };
     let genus = report.genus.map_or_else(|| "undefined".to_owned(), |genus| genus.to_string());

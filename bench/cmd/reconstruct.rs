@@ -23,7 +23,7 @@ use crate::provenance::peak_bytes;
 pub struct Arguments {
     /// Medial mesh (.ma, or .ply with radii) [default for the power crust: all inner poles of the surface].
     axis: Option<PathBuf>,
-    /// Write the surface (.ply, .off, .obj) in the units of the medial mesh.
+    /// Write the surface (.ply, .off, .obj, .stl) in the units of the medial mesh.
     #[arg(short, long)]
     output: PathBuf,
     /// Compute this kind of surface.

@@ -83,6 +83,7 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
         rebuilt.get_or_insert(of_site);
     }
     let Rebuilt { records, files, mut warnings, undrawn } = rebuilt.expect("one of the two");
+    let is_complete = unmeasured.is_empty();
     warnings.extend(undrawn.into_iter().chain(unmeasured));
     if held.as_ref().is_some_and(|store| store.was_cut) {
         warnings
@@ -97,7 +98,8 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     let object = json!({ "records": count, "files": files });
     let folder = arguments.site.as_ref().filter(|_| is_read).unwrap_or(dir);
     let text = format!("{count} records; page: {}", folder.join(PAGE).display());
-    Ok(print_result(global, &object, &text, &warnings))
+    let exit = print_result(global, &object, &text, &warnings);
+    Ok(if is_complete { exit } else { Exit::SomeFailed })
 }
 
 /// Merges stores into `out`: records with their medial meshes, the study, the notes of the runs. Of

@@ -1,6 +1,7 @@
 //! `medial simplify MESH [--method ID] -o x.ma`: one method, one mesh.
 
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use medial::complex;
@@ -14,7 +15,7 @@ use medial_run::timed::Fault;
 
 use crate::args::{
     AxisArguments, Global, MeasureArguments, MeshArgument, SubstrateArguments, key_value, method,
-    params,
+    params, whole,
 };
 use crate::exit::{Exit, Failure};
 use crate::files::{check_apart, check_output, left_out, shape_of};
@@ -30,7 +31,7 @@ pub struct Arguments {
     #[arg(long, short, value_name = "ID")]
     method: Option<String>,
     /// Simplify to N spheres.
-    #[arg(long, value_name = "N", conflicts_with_all = ["level", "max_error"])]
+    #[arg(long, value_name = "N", conflicts_with_all = ["level", "max_error"], allow_negative_numbers = true, value_parser = whole)]
     spheres: Option<usize>,
     /// Simplify to native level X, in the unit of the method, or to its `published` level [default with --method].
     #[arg(long, value_name = "X", conflicts_with = "max_error", allow_negative_numbers = true, value_parser = level)]
@@ -61,6 +62,7 @@ pub struct Arguments {
 
 /// Runs the verb. Fails when the input is refused, the level is not met at all, or the output cannot be written.
 pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Result<Exit, Failure> {
+    let start = Instant::now();
     let entry = arguments.entry(registry)?;
     let options = arguments.substrate.shape_options()?;
     // Errors that need no mesh are reported before it is read.
@@ -111,7 +113,10 @@ pub fn run(arguments: &Arguments, global: &Global, registry: &Registry) -> Resul
     if let Some(search) = &search {
         object["max_error"] = serde_json::to_value(search).map_err(Failure::input)?;
     }
-    let text = described(&simplify, search.as_ref(), arguments);
+    let native = entry.method().info().native.as_ref();
+    let unit =
+        native.map_or_else(String::new, |native| format!("({}, {})", native.name, native.unit));
+    let text = described(&simplify, search.as_ref(), arguments, &unit, start.elapsed());
     warnings.splice(..0, simplify.warnings);
     Ok(print_result(global, &object, &text, &warnings))
 }
@@ -160,10 +165,16 @@ impl Arguments {
 }
 
 /// The result in words.
-fn described(simplify: &Simplify, search: Option<&Searched>, arguments: &Arguments) -> String {
+fn described(
+    simplify: &Simplify,
+    search: Option<&Searched>,
+    arguments: &Arguments,
+    unit: &str,
+    all: Duration,
+) -> String {
     let seconds = simplify.seconds.unwrap_or_default();
     let mut text = format!(
-        "{}{}: {}, {}, {}; substrates {:.2} s, prepare {:.2} s, simplify {:.2} s",
+        "{}{}: {}, {}, {}; shared data {:.2} s, prepare {:.2} s, simplify {:.2} s, in all {:.2} s",
         simplify.method,
         if arguments.method.is_none() { " (default)" } else { "" },
         counted(simplify.spheres.unwrap_or(0) as u64, "sphere"),
@@ -171,10 +182,11 @@ fn described(simplify: &Simplify, search: Option<&Searched>, arguments: &Argumen
         counted(simplify.faces.unwrap_or(0) as u64, "face"),
         seconds.substrate,
         seconds.prepare,
-        seconds.simplify
+        seconds.simplify,
+        all.as_secs_f64()
     );
     if let Some(level) = simplify.native_level {
-        text += &format!("\n  native level {}", significant(level, 4));
+        text += &format!("\n  native level {} {unit}", significant(level, 4));
     }
     if let Some(search) = search {
         let of = match search.tried {

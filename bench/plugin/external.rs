@@ -62,7 +62,9 @@ impl External {
         });
         (!names.is_empty()).then(|| {
             let (id, names) = (&info.id, names.join(", "));
-            format!("plug-in {id}: changes of {names} are not noticed; list them in `files = [...]`")
+            format!(
+                "plug-in {id}: changes of {names} are not noticed; list them in `files = [...]`"
+            )
         })
     }
 

@@ -198,8 +198,8 @@ pub struct Failure {
 /// A message whose advice names calls of the package instead of commands.
 pub(crate) fn advice_in_python(message: &str) -> String {
     let calls = [
-        ("medial repair --fill-holes", "Mesh.repair(..., fill_holes=True)"),
-        ("medial repair --wrap", "Mesh.repair(..., wrap=True)"),
+        ("medial repair FILE --fill-holes -o OUT", "Mesh.repair(..., fill_holes=True)"),
+        ("medial repair FILE --wrap -o OUT", "Mesh.repair(..., wrap=True)"),
         ("--sampling conforming:N", "sampling=\"conforming:N\""),
     ];
     calls.iter().fold(message.to_owned(), |text, (command, call)| text.replace(command, call))

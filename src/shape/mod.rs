@@ -149,7 +149,7 @@ impl Triangulated {
 const LEAST_BUDGET: usize = 20_000;
 
 /// What helps where parts of a surface are too close to each other.
-const ADVICE: &str = "give more samples (`--sampling conforming:N`), or wrap the surface (`medial repair --wrap`), which \
+const ADVICE: &str = "give more samples (`--sampling conforming:N`), or wrap the surface (`medial repair FILE --wrap -o OUT`), which \
                       closes gaps narrower than 2 % of the diagonal";
 
 /// The part that does not depend on the samples.

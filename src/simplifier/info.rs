@@ -270,6 +270,10 @@ impl Params {
                 .map_err(|error| error.to_string())
         };
         parse(&self.0).map_err(|message| {
+            // Serde's word for a parameter. Its message names the key.
+            if let Some(unknown) = message.strip_prefix("unknown field ") {
+                return SimplifyError::Parameter(unknown.replacen(", ", " is unknown, ", 1));
+            }
             // Serde does not report the key of a wrong value: the one that fails alone too.
             let wrong = self.0.iter().find(|&(key, value)| {
                 let alone = serde_json::Map::from_iter([(key.clone(), value.clone())]);

@@ -238,7 +238,7 @@ fn inspected(mut soup: soup::PolygonSoup) -> Result<Inspection, Fault> {
                     "bodies nearer than 1e-6 of the diagonal were not joined, so that results may be wrong"
                 }
             };
-            let why = format!("{why}; wrap the surface (`medial repair --wrap`)");
+            let why = format!("{why}; wrap the surface (`medial repair FILE --wrap -o OUT`)");
             inspection.report.warnings.push(why);
         }
     }

@@ -133,7 +133,13 @@ pub enum Fault {
     #[error("{count} {what} are more than 32-bit indices can name")]
     TooLarge { what: &'static str, count: u64 },
     /// Points without a surface.
-    #[error("no face among {}; a closed surface is needed, not a point set", counted(*.vertices, "vertex"))]
+    #[error("{}", match *.vertices {
+        0 => "no vertex and no face found; check that the content is what the extension says".to_owned(),
+        some => format!(
+            "no face among {}; wrap the points (`medial repair FILE --wrap -o OUT`)",
+            counted(some, "vertex")
+        ),
+    })]
     NoFaces { vertices: usize },
     /// Every face has corners at the same position.
     #[error(
@@ -150,46 +156,50 @@ pub enum Fault {
     /// Edges with one face only.
     #[error(
         "the surface is open: {} with one face only, the first from {} to {}; fill its holes \
-         (`medial repair --fill-holes`) or wrap it (`medial repair --wrap`)",
+         (`medial repair FILE --fill-holes -o OUT`) or wrap it (`medial repair FILE --wrap -o OUT`)",
         counted(*.edges, "edge"), .first[0], .first[1]
     )]
     Open { edges: usize, first: [VertexName; 2] },
     /// A hole that is too long to be filled.
     #[error(
         "the hole at {first} has {edges} edges, too many to fill (at most {most}); wrap the surface \
-         (`medial repair --wrap`)"
+         (`medial repair FILE --wrap -o OUT`)"
     )]
     LongHole { edges: usize, most: usize, first: VertexName },
     /// A hole whose edges are no loop.
-    #[error("the edges of a hole branch at {at}; wrap the surface (`medial repair --wrap`)")]
+    #[error(
+        "the edges of a hole branch at {at}; wrap the surface (`medial repair FILE --wrap -o OUT`)"
+    )]
     BranchingHole { at: VertexName },
     /// A hole whose triangles would have an edge with two faces.
     #[error(
         "the hole at {first} cannot be filled: an edge would have three faces; wrap the surface \
-         (`medial repair --wrap`)"
+         (`medial repair FILE --wrap -o OUT`)"
     )]
     BlockedHole { first: VertexName },
     /// Edges with more than two faces.
     #[error(
         "the surface is not manifold: {} with more than two faces, the first ({faces} faces) \
-         from {} to {}; wrap it (`medial repair --wrap`), or remove inner walls in a mesh editor",
+         from {} to {}; wrap it (`medial repair FILE --wrap -o OUT`), or remove inner walls in a mesh editor",
         counted(*.edges, "edge"), .first[0], .first[1]
     )]
     NonManifoldEdge { edges: usize, first: [VertexName; 2], faces: usize },
     /// Vertices whose faces form more than one fan.
     #[error(
         "the surface is not manifold: {} where parts touch in a point, the first is {first}; \
-         wrap them (`medial repair --wrap`)",
+         wrap them (`medial repair FILE --wrap -o OUT`)",
         counted(*.vertices, "vertex")
     )]
     NonManifoldVertex { vertices: usize, first: VertexName },
     /// One-sided, such as a Klein bottle.
-    #[error("the component of face {face} is one-sided; wrap it (`medial repair --wrap`)")]
+    #[error(
+        "the component of face {face} is one-sided; wrap it (`medial repair FILE --wrap -o OUT`)"
+    )]
     NonOrientable { face: usize },
     /// A component whose two sides coincide.
     #[error(
         "the component of face {face} ({}) encloses no volume; \
-         give it thickness, or wrap it (`medial repair --wrap`)",
+         give it thickness, or wrap it (`medial repair FILE --wrap -o OUT`)",
         counted(*.faces, "face")
     )]
     ZeroVolume { face: usize, faces: usize },

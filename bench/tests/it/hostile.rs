@@ -149,7 +149,7 @@ fn a_surface_with_a_hole_and_a_second_part_is_repaired() {
     let faces = lines[1].split(' ').nth(1).expect("a count").parse::<usize>().expect("a count");
     lines[1] = lines[1].replace(&format!(" {faces} "), &format!(" {} ", faces - 1));
     at.write("open.off", lines.join("\n"));
-    at.refused("info open.off", 1, "`medial repair --fill-holes`");
+    at.refused("info open.off", 1, "`medial repair FILE --fill-holes -o OUT`");
     let repair = |more: &str| at.json(&format!("repair open.off -o repaired.off {more}"));
     assert_eq!(repair("").0, 1);
     assert!(!at.has("repaired.off"));

@@ -66,7 +66,7 @@ fn a_program_without_a_number_is_named() {
     ] {
         let (code, object) = at.json(&format!("report 1 --metric mine={program}"));
         let warnings = object["warnings"].as_array().expect("warnings");
-        assert_eq!((code, warnings.len()), (0, 4), "{object}");
+        assert_eq!((code, warnings.len()), (3, 4), "{object}");
         assert!(
             warnings.iter().all(|warning| warning.as_str().is_some_and(|w| w.contains(words))),
             "{object}"
