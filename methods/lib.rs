@@ -16,9 +16,11 @@ pub mod lambda;
 mod levels;
 pub mod pmat;
 pub mod qmat;
+mod quadric;
 mod ranked;
 pub mod sat;
 pub mod sat_pairwise;
+pub mod sphere_mesh;
 pub mod tam_heidrich;
 pub mod tight;
 pub mod vmas;
@@ -29,7 +31,7 @@ pub type Result<T, E = SimplifyError> = std::result::Result<T, E>;
 /// A method on one shape, ready for levels.
 type Prepared<'s> = Result<Box<dyn Simplification + 's>>;
 
-/// All methods, in the order of the tables. `vmas`, `cover` and `sat-pairwise` are marked to run only when named.
+/// All methods, in the order of the tables. Some are marked to run only when named.
 pub fn registry() -> Vec<Registered> {
     let methods = vec![
         Registered::from(angle::method())
@@ -85,6 +87,9 @@ pub fn registry() -> Vec<Registered> {
                  it.",
             )
             .sweep(&[0.01, 0.02, 0.05]),
+        Registered::from(sphere_mesh::method())
+            .best_for("A few spheres straight from a dense surface, without a medial axis.")
+            .on_request(),
         Registered::from(vmas::method())
             .best_for("Up to a few hundred evenly spread spheres of an organic shape.")
             .on_request(),
@@ -131,9 +136,10 @@ fn hash_of(module: &str) -> Option<&'static str> {
 
 /// Seconds at the default levels on bear.off on two cores, from cheap to dear, measuring included. Only their order
 /// and their ratios matter.
-const SECONDS: [(&str, f64); 15] = [
+const SECONDS: [(&str, f64); 16] = [
     ("initial", 3.0),
     ("qmat", 0.5),
+    ("sphere-mesh", 0.6),
     ("pmat", 1.0),
     ("sat-pairwise", 2.2),
     ("coverage-axis", 2.6),

@@ -102,15 +102,15 @@ pub(crate) fn overview_table(
 }
 
 /// The end of a comparison as plain text, at most 100 characters wide: the table of all methods at the requested count
-/// nearest to 100, and that of the error bounds where there are any. `methods` has what each is best suited for.
-pub fn summary_text(records: &[Record], methods: &[MethodNote]) -> String {
+/// nearest to 100, and that of the error bounds where there are any.
+pub fn summary_text(records: &[Record]) -> String {
     let comparison = Comparison::new(records);
     let mut text = String::new();
-    if let Some(table) = overview_table(&comparison, &by_count(&comparison), methods) {
-        // The names and seconds of an edition take its room.
+    if let Some(table) = overview_table(&comparison, &by_count(&comparison), &[]) {
+        // Sentences do not fit a line, and the names and seconds of an edition take the room of another column.
         let is_mixed = comparison.edition_note().is_some();
-        let left_out: &[&str] = if is_mixed { &["best suited for", "means over"] } else { &[] };
-        let table = table.without(left_out);
+        let table = table.without(&["best suited for"]);
+        let table = if is_mixed { table.without(&["means over"]) } else { table };
         text += &format!("{}\n{}", table.caption, plain(&table));
         table.notes.iter().for_each(|note| text += &wrapped(note));
     }

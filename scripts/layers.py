@@ -34,7 +34,7 @@ CRATES = {
 # The library's and the methods' own tests may use the built-in shapes.
 IN_TESTS = {"medial-datasets", "medial-test-support"}
 
-METHODS = set("angle aof cover coverage_axis dey_zhao hem lambda pmat qmat sat sat_pairwise tam_heidrich tight vmas".split())
+METHODS = set("angle aof cover coverage_axis dey_zhao hem lambda pmat qmat sat sat_pairwise sphere_mesh tam_heidrich tight vmas".split())
 
 # The modules of a crate from below: each may use those of earlier layers and its own.
 LAYERS = {

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 
 use clap::Args;
-use medial_reports::{read_header, reasons};
+use medial_reports::reasons;
 use medial_run::input::Source;
 use medial_run::item::{GIVEN, Item};
 use medial_run::record::{Record, Status};
@@ -357,8 +357,7 @@ fn finish(
         print_json(&object, &notes);
     } else {
         if ok > 0 {
-            let methods = read_header(out).unwrap_or_default().methods;
-            print_line(&medial_reports::summary_text(shown, &methods));
+            print_line(&medial_reports::summary_text(shown));
         }
         notes.iter().for_each(|note| print_line(note));
         let external = match count(records, Status::External) {

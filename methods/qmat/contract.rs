@@ -9,14 +9,12 @@ use medial::simplifier::{Diagnostics, RunContext};
 use rayon::prelude::*;
 
 use super::QmatParams;
-use super::quadric::{Quadric, Skipped, initial_quadrics};
+use super::quadric::{Skipped, initial_quadrics};
 use crate::Result;
+use crate::quadric::{Quadric, SINGULAR_RATIO};
 
 /// Collapses between two reports of progress.
 const REPORT_EVERY: usize = 4096;
-
-/// Ratio of the smallest to the largest eigenvalue at which a quadric counts as singular.
-pub(super) const SINGULAR_RATIO: f64 = 1e-10;
 
 /// Number of edges from which on a star is evaluated in parallel.
 const LARGE_STAR: usize = 2048;

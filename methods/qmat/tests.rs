@@ -10,9 +10,9 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::contract::{Contraction, SINGULAR_RATIO};
-use super::quadric::Quadric;
+use super::contract::Contraction;
 use super::{QmatParams, *};
+use crate::quadric::{Quadric, SINGULAR_RATIO};
 
 fn params() -> QmatParams {
     QmatParams::default()

@@ -309,7 +309,7 @@ property float z => property list uchar float z => line 6: expected a number as 
 property list uchar int vertex_indices => property int vertex_indices => line 8: expected a list as the property vertex_indices, found "int"
 float y => floot y => line 5: expected a PLY header, found
 element face 1 => element face x => line 7: expected a PLY header, found
-element face 1\nproperty list uchar int vertex_indices\n =>  => no face among 3 vertices; a closed surface is needed, not a point set
+element face 1\nproperty list uchar int vertex_indices\n =>  => no face among 3 vertices; wrap the points
 element face => element tristrips => PLY triangle strips are not read;
 1 0 0\n => 1 0\n => line 11: expected vertex 1, found
 3 0 1 2 => 3 0 1 3 => line 13: face 0 refers to vertex 3, but there are 3 vertices

@@ -275,11 +275,8 @@ fn fault(at: Place, expected: &str, error: &ParseError) -> Fault {
     }
     let text = text.split_once(": ").filter(|_| text.starts_with("Line ")).map_or(&*text, |t| t.1);
     if text.contains("magic number") {
-        return Fault::Syntax {
-            at,
-            expected: "`ply`".to_owned(),
-            found: "another first line".to_owned(),
-        };
+        let found = "another first line than `ply`".to_owned();
+        return Fault::Syntax { at, expected: expected.to_owned(), found };
     }
     let parts: Vec<&str> = text.splitn(3, "\n\t").take(2).map(str::trim).collect();
     let found = parser_message(&parts.join(" ")).chars().take(MOST).collect();

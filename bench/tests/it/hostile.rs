@@ -205,7 +205,7 @@ fn a_wrap_without_a_radius_or_with_wrong_input_is_refused() {
         (UNFIT[0], "--wrap --fill-holes", 2, "cannot be used with"),
         (UNFIT[0], "--wrap=1e-12", 1, "the offset is too small"),
         (&UNFIT[0].replace("1 1 0", "1 nan 0"), "--wrap", 1, "not finite"),
-        ("OFF\n0 0 0\n", "--wrap", 1, "no face among 0 vertices"),
+        ("OFF\n0 0 0\n", "--wrap", 1, "no vertex and no face found"),
         ("OFF\n1 0 0\n1 2 3\n", "--wrap", 1, "the bounding box has the diagonal 0.0"),
     ] {
         at.write("unfit.off", text);

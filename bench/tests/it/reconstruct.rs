@@ -124,7 +124,7 @@ fn requests_without_a_surface_are_refused() {
     }
     let mesh = "--mesh builtin:sphere:8";
     for (words, expected, part) in [
-        ("ball.ma -o x.stl", 1, "(found \"stl\", expected one of .ply"),
+        ("ball.ma -o x.step", 1, "(found \"step\", expected one of .ply"),
         ("ball.ma -o no/such/x.ply", 1, "the folder does not exist; create it by `mkdir -p"),
         ("no-such.ma -o x.ply", 1, "no-such.ma"),
         ("ball.ma -o x.ply --method power-crust", 2, "--mesh MESH"),

@@ -13,5 +13,6 @@ mod pmat;
 mod qmat;
 mod rounding;
 mod sat;
+mod sphere_mesh;
 mod tam_heidrich;
 mod vmas;
