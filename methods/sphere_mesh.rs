@@ -21,8 +21,8 @@
 //!
 //! The paper was read in its abstract and in the authors' public header of the quadric.
 //!
-//! - The share of the directional width in `R` is not in these sources: 3/4. On the twelve real meshes at 100 spheres 1/2
-//!   and 1 change the mean error by the figures of `docs/measured/sphere-mesh.md`.
+//! - The share of the directional width in `R` is not in these sources. It is 3/4; 1/2 and 1 change the mean error on
+//!   twelve meshes by 8 % at most (`docs/measured/sphere-mesh.md`).
 //! - The directions are 30 of a spiral on the half-sphere, and the three axes.
 //! - Where the minimiser has a radius beyond its bounds, the better of the minimisers at both bounds is taken; where
 //!   these are not unique, that of a centre on the edge.
@@ -34,8 +34,8 @@
 //! - The authors' header calls a system singular below a determinant of `1e-4`, which depends on the unit. Here it is
 //!   singular when its smallest eigenvalue is `1e-10` of the largest.
 //!
-//! No test of the topology is known of the paper, and there is none here: the closed surface of the start has a void, which
-//! goes when the sheets of a part meet.
+//! No test of the topology is known of the paper, and there is none here. While opposite sides of the surface have not met,
+//! the union of a result is hollow: its two-sided error then has the inner side, and its Betti numbers a void.
 
 use medial::Vec3;
 use medial::complex::collapse::{Candidate, CollapseComplex, CollapseQueue};
