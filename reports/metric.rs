@@ -521,6 +521,13 @@ pub const METRICS: &[Metric] = &[
     length("axis_true_to_computed_mean", "from the true axis, mean", |e| {
         Some(e.axis?.true_to_computed_mean)
     }),
+    Metric::new(
+        "axis_chamfer",
+        "chamfer distance",
+        "squared diagonals",
+        (Better::Lower, Digits::Significant, GEOMETRIC),
+        Value::Evaluation(|e| e.axis?.chamfer),
+    ),
     SHEETS_MATCHED,
     CONTACTS_RIGHT,
     SEAMS_RIGHT,

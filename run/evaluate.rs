@@ -14,7 +14,7 @@ pub struct Evaluator<'a> {
     pub certify: Option<f64>,
     /// Whether edges and faces are dropped before the evaluation.
     pub spheres_alone: bool,
-    /// A medial mesh to compare the sheets with, in input units.
+    /// A medial mesh to compare with as a set of points and by its sheets, in input units.
     pub reference: Option<&'a MedialMesh>,
 }
 
@@ -31,9 +31,12 @@ impl Evaluator<'_> {
         let mut evaluation = self.judge.evaluate_certified(&mesh, self.certify)?;
         // Points are looked for in the surface file.
         evaluation.move_witnesses(|point| units.backward(point));
-        if let (Some(reference), Some(structure)) = (self.reference, &mut evaluation.structure) {
-            structure.known =
-                Some(self.judge.sheet_difference(&mesh, &reference.to_normal(units))?);
+        if let Some(reference) = self.reference {
+            let reference = reference.to_normal(units);
+            evaluation.axis = Some(self.judge.axis_difference(&mesh, &reference)?);
+            if let Some(structure) = &mut evaluation.structure {
+                structure.known = Some(self.judge.sheet_difference(&mesh, &reference)?);
+            }
         }
         Ok(evaluation)
     }

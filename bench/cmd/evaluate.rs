@@ -45,7 +45,8 @@ pub struct Arguments {
     /// Print all metrics; `--reference` does, too.
     #[arg(long)]
     all: bool,
-    /// Compare the sheets with those of this medial mesh, such as a dense axis of the surface.
+    /// Compare with this medial mesh, such as a dense axis of the surface or a known skeleton: the distances both ways as sets
+    /// of points, the chamfer distance, and the sheets.
     #[arg(long, value_name = "X.ma")]
     reference: Option<PathBuf>,
     #[command(flatten)]

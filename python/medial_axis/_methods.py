@@ -85,6 +85,10 @@ class CoverageAxis(Options, total=False):
     select: Literal["greedy", "exact"]
 
 
+class SphereMesh(Options, total=False):
+    """Options of `sphere-mesh`."""
+
+
 class Vmas(Options, total=False):
     """Options of `vmas`."""
 
@@ -134,6 +138,8 @@ class Simplify(Protocol):
     def __call__(self, method: Literal["aof"], **options: Unpack[Aof]) -> MedialAxis: ...
     @overload
     def __call__(self, method: Literal["coverage-axis"], **options: Unpack[CoverageAxis]) -> MedialAxis: ...
+    @overload
+    def __call__(self, method: Literal["sphere-mesh"], **options: Unpack[SphereMesh]) -> MedialAxis: ...
     @overload
     def __call__(self, method: Literal["vmas"], **options: Unpack[Vmas]) -> MedialAxis: ...
     @overload

@@ -494,7 +494,7 @@ def _off(vertices: FloatArray, faces: IndexArray) -> bytes:
     return "\n".join(lines).encode() + b"\n"
 
 
-def _foreign(value: object) -> tuple[Any, Any]:
+def _foreign(value: Any) -> tuple[Any, Any]:
     """Vertices and triangles of an object of another package."""
     if isinstance(value, (tuple, list)) and len(value) == 2:
         return value[0], value[1]

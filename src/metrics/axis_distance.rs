@@ -4,6 +4,8 @@
 //! other.
 //!
 //! - Maxima are over samples of all triangles and lone edges, and all spheres.
+//! - The chamfer distance is half the sum of the mean squared distances both ways, over points at [`SPACING`] on all parts
+//!   together (Clemot, Digne 2023, *Neural skeleton*).
 //! - Means are over the parts of the highest dimension that the sampled axis has: by area if it has
 //!   triangles, else by length, else over its points. A curve has no area, so it has no weight next to
 //!   a sheet.
@@ -14,6 +16,12 @@ use super::samples::place_on_triangles;
 use crate::Vec3;
 use crate::complex::{MedialMesh, UnionError};
 use crate::surface::TriangleBvh;
+
+/// Distance of the points of the chamfer distance, in diagonals.
+const SPACING: f64 = 1e-3;
+
+/// Limit of these points on the sheets, and on the curves.
+const MOST_SPACED: usize = 1 << 20;
 
 /// An axis, prepared to be sampled and to be measured against.
 pub(super) struct PreparedAxis {
@@ -66,7 +74,30 @@ impl PreparedAxis {
             computed_to_true_mean: there[1],
             true_to_computed_max: back[0],
             true_to_computed_mean: back[1],
+            chamfer: None,
         })
+    }
+
+    /// The chamfer distance between this axis and another, in squared units.
+    pub fn chamfer(&self, other: &Self, seed: u64) -> f64 {
+        let mean_square = |from: &Self, to: &Self| {
+            let distances = to.tree.distance_batch(&from.spaced(seed));
+            distances.iter().map(|distance| distance * distance).sum::<f64>()
+                / distances.len() as f64
+        };
+        0.5 * (mean_square(self, other) + mean_square(other, self))
+    }
+
+    /// Points on all parts, one on average for each square of side [`SPACING`] and each length of it, and all centres.
+    fn spaced(&self, seed: u64) -> Vec<Vec3> {
+        let area = |&[a, b, c]: &[Vec3; 3]| 0.5 * (b - a).cross(c - a).length();
+        let area: f64 = self.triangles.iter().map(area).sum();
+        let length: f64 = self.segments.iter().map(|[a, b]| a.distance(*b)).sum();
+        let count = |size: f64| (size.ceil() as usize).clamp(1, MOST_SPACED);
+        let placed = place_on_triangles(&self.triangles, count(area / (SPACING * SPACING)), seed);
+        let sheets = placed.unwrap_or_default().into_iter().map(|(_, point)| point);
+        let curves = sample_segments(&self.segments, count(length / SPACING));
+        sheets.chain(curves).chain(self.centres.iter().copied()).collect()
     }
 
     fn max_and_mean(&self, to: &TriangleBvh, samples: usize, seed: u64) -> [f64; 2] {
@@ -122,6 +153,11 @@ mod tests {
         let off = compare(&shifted, &axis).unwrap();
         assert!((off.computed_to_true_max - 0.01).abs() < 1e-6, "{off:?}");
 
+        // Each point is as far as the shift across the sheets, and less along them.
+        let [a, b] = [&axis, &shifted].map(|mesh| PreparedAxis::new(mesh).unwrap());
+        let chamfer = a.chamfer(&b, 0);
+        assert!(chamfer > 0.0 && chamfer < 1e-4 && a.chamfer(&a, 0) < 1e-28, "{chamfer}");
+
         // A segment against a longer one: everything of the short one is near, but not conversely.
         let segment = |length: f64, y: f64| {
             let ends = [0.0, length].map(|x| Sphere::new(Vec3::new(x, y, 0.0), 0.1));
@@ -135,6 +171,11 @@ mod tests {
         // Mean over [1, 2] of the hypotenuse over (x - 1, 0.5), by its antiderivative.
         let tail = 0.5 * 1.25_f64.sqrt() + 0.125 * 2.0_f64.asinh();
         assert!((d.true_to_computed_mean - (0.5 + tail) / 2.0).abs() < 1e-6);
+
+        // 0.25 along the short one; the integral of 0.25 + max(x - 1, 0)² over the long one is 0.5 + 1/3.
+        let [a, b] = [&short, &long].map(|mesh| PreparedAxis::new(mesh).unwrap());
+        let exact = 0.5 * (0.25 + (0.5 + 1.0 / 3.0) / 2.0);
+        assert!((a.chamfer(&b, 0) - exact).abs() < 1e-3, "{}", a.chamfer(&b, 0));
 
         let point = vec![Sphere::new(Vec3::Y, 0.1)];
         let d = compare(&MedialMesh::from_simplices(point, vec![], vec![]).unwrap(), &long);

@@ -235,6 +235,9 @@ pub struct AxisDistances {
     pub true_to_computed_max: f64,
     /// Mean of the same.
     pub true_to_computed_mean: f64,
+    /// Half the sum of the mean squared distances both ways, in squared diagonals; against a reference only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chamfer: Option<f64>,
 }
 
 /// An interval that holds the Hausdorff distance between a surface and the boundary of a union.

@@ -8,7 +8,9 @@ use super::certificate::certify;
 use super::cover::CoverTest;
 use super::envelope::{EnvelopeOptions, sample_envelope_in};
 use super::error::MetricError;
-use super::evaluation::{Certificate, Cover, Distances, Evaluation, MeanAndP95, SheetDifference};
+use super::evaluation::{
+    AxisDistances, Certificate, Cover, Distances, Evaluation, MeanAndP95, SheetDifference,
+};
 use super::hausdorff::distances_with_envelope;
 use super::quality::{counts, triangle_quality};
 use super::samples::{Pose, SurfaceSamples};
@@ -276,6 +278,25 @@ impl Judge {
     ) -> Result<SheetDifference, MetricError> {
         let samples = self.samples()?;
         sheet_difference(&samples.ordered(mesh)?.0, &samples.ordered(reference)?.0)
+    }
+
+    /// The distances between a medial mesh and a reference as sets of points, both in units of the surface's diagonal: the
+    /// same for every numbering of their spheres.
+    ///
+    /// # Errors
+    /// As [`Judge::sheet_difference`].
+    pub fn axis_difference(
+        &self,
+        mesh: &MedialMesh,
+        reference: &MedialMesh,
+    ) -> Result<AxisDistances, MetricError> {
+        let ordered = self.samples()?;
+        let [mesh, reference] =
+            [mesh, reference].map(|mesh| PreparedAxis::new(&ordered.ordered(mesh)?.0));
+        let (mesh, reference) = (mesh?, reference?);
+        let JudgeOptions { samples, seed, .. } = self.options;
+        let chamfer = Some(mesh.chamfer(&reference, seed));
+        Ok(AxisDistances { chamfer, ..mesh.distances(&reference, samples, seed)? })
     }
 
     fn volumes(
