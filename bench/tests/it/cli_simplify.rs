@@ -187,3 +187,24 @@ fn published_counts_and_errors_on_real_meshes() {
     }
     check_qmat(&meshes.join("bear.off").display().to_string(), 0.0155, [1, 0, 0]);
 }
+
+/// Distances to a reference are those between two sets of points: zero to itself, the same both ways.
+#[test]
+fn a_reference_is_compared_as_a_set_of_points() {
+    let at = Folder::new();
+    for (spheres, file) in [(60, "fine.ma"), (20, "coarse.ma")] {
+        at.done(&format!("simplify builtin:torus -m qmat --spheres {spheres} -o {file}"));
+    }
+    let to = |file: &str, reference: &str| {
+        let line = format!("evaluate builtin:torus {file} --samples 500 --reference {reference}");
+        let (code, object) = at.json(&line);
+        assert_eq!(code, 0, "{object}");
+        let keys = ["chamfer", "computed_to_true_max", "true_to_computed_max"];
+        keys.map(|key| number(&object["axis"][key]))
+    };
+    assert!(to("fine.ma", "fine.ma").into_iter().all(|distance| distance < 1e-12));
+    let (there, back) = (to("coarse.ma", "fine.ma"), to("fine.ma", "coarse.ma"));
+    assert_eq!([there[0], there[1], there[2]], [back[0], back[2], back[1]]);
+    // A polygon of 20 corners is off the finer one by the height of its arcs.
+    assert!(there[0] > 1e-8 && there[0] < 1e-4 && there[1] < 0.02, "{there:?}");
+}
