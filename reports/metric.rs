@@ -390,6 +390,16 @@ pub(crate) const OVERSHOOT_MEAN: Metric =
 pub(crate) const VOLUME_RATIO: Metric =
     share("volume_ratio", "union's volume", "% of the solid's", |e| e.volume_ratio).neutral();
 
+// The union and the symmetric difference give both parts: `ratio = covered + outside`, `error = (1 - covered) + outside`.
+const VOLUME_COVERED: Metric = share("volume_covered", "covered volume", "% of the solid's", |e| {
+    Some(0.5 * (1.0 + e.volume_ratio? - e.volume_error?))
+})
+.higher();
+
+const VOLUME_OUTSIDE: Metric = share("volume_outside", "volume outside", "% of the solid's", |e| {
+    Some(0.5 * (e.volume_ratio? + e.volume_error? - 1.0))
+});
+
 /// The columns of the table of cover.
 pub(crate) const COVER: [&Metric; 6] =
     [&UNCOVERED, &OVERSHOOT, &LARGER_SIDE, &UNCOVERED_MEAN, &OVERSHOOT_MEAN, &VOLUME_RATIO];
@@ -479,6 +489,8 @@ pub const METRICS: &[Metric] = &[
     share("centres_outside", "centres outside", "% of spheres", |e| e.centres_outside).gate(),
     share("volume_error", "volume error", "% of the volume", |e| e.volume_error).gate(),
     VOLUME_RATIO,
+    VOLUME_COVERED,
+    VOLUME_OUTSIDE,
     length("uncovered_lower", "uncovered, at least", |e| Some(e.cover?.uncovered.lower))
         .at("cover.uncovered.lower"),
     UNCOVERED,

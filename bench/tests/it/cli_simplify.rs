@@ -208,3 +208,24 @@ fn a_reference_is_compared_as_a_set_of_points() {
     // A polygon of 20 corners is off the finer one by the height of its arcs.
     assert!(there[0] > 1e-8 && there[0] < 1e-4 && there[1] < 0.02, "{there:?}");
 }
+
+/// A ball within a ball covers the cube of the ratio of radii, one around it the whole.
+#[test]
+fn covered_and_outside_volume_are_those_of_balls() {
+    let at = Folder::new();
+    for (radius, covered, outside) in [(0.5, 12.5, 0.0), (1.5, 100.0, 237.5)] {
+        at.write("ball.ma", format!("1 0 0\nv 0 0 0 {radius}\n"));
+        let text = at.done("evaluate builtin:sphere:64 ball.ma --samples 500 --all");
+        let value = |name: &str| -> f64 {
+            let line = text.lines().find(|line| line.trim_start().starts_with(name));
+            let word = line.and_then(|line| line.split_whitespace().last()).expect(name);
+            word.parse().expect("a number")
+        };
+        // Of the octree's finest cells and of the facets of the sphere.
+        assert!((value("covered volume") - covered).abs() < 2.0, "{radius}: {text}");
+        assert!(
+            (value("volume outside") - outside).abs() < 0.02 * (outside + 50.0),
+            "{radius}: {text}"
+        );
+    }
+}
