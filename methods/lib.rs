@@ -94,7 +94,7 @@ pub fn registry() -> Vec<Registered> {
             .best_for("Up to a few hundred evenly spread spheres of an organic shape.")
             .on_request(),
         Registered::from(tight::method(qmat::method())).best_for(
-            "The least two-sided error with few spheres, for 4 to 24 CPU \
+            "The least two-sided error with few spheres, for 4 to 27 CPU \
              seconds a count up to 500.",
         ),
         Registered::from(cover::method())
