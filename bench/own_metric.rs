@@ -1,6 +1,6 @@
 //! Metrics of the user: numbers of the results of a store, which its report shows like those of the program.
 //!
-//! The file `metrics.json` next to the records has them by the hash of a result. They are measured after the run, on the
+//! The file `metrics.json` next to the records has them by the hashes of a mesh and a result. They are measured after the run, on the
 //! saved medial meshes, and each result once.
 
 use std::collections::BTreeMap;
@@ -59,6 +59,8 @@ impl FromStr for OwnMetric {
 pub struct Saved<'a> {
     /// Name of the mesh.
     pub name: &'a str,
+    /// Hash of its contents: several meshes can have one name.
+    pub hash: &'a str,
     /// The surface.
     pub surface: &'a TriMesh,
     /// The result.
@@ -73,8 +75,13 @@ pub struct Saved<'a> {
 pub(crate) struct Numbers {
     pub(crate) unit: String,
     pub(crate) better: Better,
-    /// By the hash of the result.
+    /// By [`key`].
     pub(crate) values: BTreeMap<String, f64>,
+}
+
+/// The key of a record's number: the same result can belong to two meshes. `None` without a result.
+pub(crate) fn key(record: &Record) -> Option<String> {
+    Some(format!("{} {}", record.mesh_hash.as_ref()?, record.result_hash.as_ref()?))
 }
 
 /// Adds the numbers of other stores to those of a store.
@@ -110,9 +117,9 @@ pub fn printed(command: &str) -> io::Result<impl FnMut(&Saved<'_>) -> Result<f64
     let mut written: Option<String> = None; // the mesh in the folder
     Ok(move |saved: &Saved<'_>| {
         let surface = scratch.path().join("surface.off");
-        if written.as_deref() != Some(saved.name) {
+        if written.as_deref() != Some(saved.hash) {
             surface::write(&surface, saved.surface).map_err(|error| error.to_string())?;
-            written = Some(saved.name.to_owned());
+            written = Some(saved.hash.to_owned());
         }
         let (program, words) = words.split_first().ok_or("no program")?;
         let ended = Command::new(program).args(words).arg(&surface).arg(saved.path).output();
@@ -142,7 +149,7 @@ pub(crate) fn read(dir: &Path) -> Result<BTreeMap<String, Numbers>, Failure> {
 pub(crate) fn attach(dir: &Path, records: &mut [Record]) -> Result<(), Failure> {
     for (name, Numbers { unit, better, values }) in read(dir)? {
         for record in records.iter_mut() {
-            let Some(&value) = record.result_hash.as_ref().and_then(|hash| values.get(hash)) else {
+            let Some(&value) = key(record).and_then(|key| values.get(&key)) else {
                 continue;
             };
             let value = OwnValue { value, unit: unit.clone(), better };

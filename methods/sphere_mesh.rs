@@ -14,12 +14,12 @@
 //!
 //! # Notation
 //!
-//! `s = (c, r)` a sphere, `E(s) = sᵀ A s + bᵀ s + c` a quadric, `p` a point of a face, `n` its outward normal. Lengths are
+//! `s = (c, r)` a sphere with a centre and a radius, `E(s)` a quadric of it, `p` a point of a face, `n` its outward normal. Lengths are
 //! fractions of the bounding-box diagonal.
 //!
 //! # Where the sources are silent
 //!
-//! The paper was read in its abstract and in the authors' public header of the quadric.
+//! The paper was read in its abstract, and the authors' public header of the quadric in a description of it.
 //!
 //! - The share of the directional width in `R` is not in these sources. It is 3/4; 1/2 and 1 change the mean error on
 //!   twelve meshes by 8 % at most (`docs/measured/sphere-mesh.md`).
@@ -232,10 +232,10 @@ impl Contraction {
             let [of_a, of_b] = [a, b].map(|v| self.complex.neighbours(v).len());
             let [kept, removed] = if of_a >= of_b { [a, b] } else { [b, a] };
             self.complex.collapse(kept, removed, sphere);
-            let [gone, widths] = [&removed, &removed];
-            let (gone, widths) = (self.quadrics[*gone as usize], self.widths[*widths as usize]);
-            self.quadrics[kept as usize] += &gone;
-            self.widths[kept as usize].unite(&widths);
+            let [kept_at, removed_at] = [kept, removed].map(|v| v as usize);
+            let (quadric, widths) = (self.quadrics[removed_at], self.widths[removed_at]);
+            self.quadrics[kept_at] += &quadric;
+            self.widths[kept_at].unite(&widths);
             for &other in self.complex.neighbours(kept) {
                 let candidate = price(&self.complex, &self.quadrics, &self.widths, [kept, other]).0;
                 self.queue.push(candidate);

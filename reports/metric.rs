@@ -74,7 +74,7 @@ pub(crate) enum Digits {
 pub(crate) enum Value {
     Evaluation(fn(&Evaluation) -> Option<f64>),
     Record(fn(&Record) -> Option<f64>),
-    /// A metric of the user, by the key of the metric.
+    /// A metric of the user, by its title.
     Own,
 }
 
@@ -108,7 +108,7 @@ impl Metric {
         let value = match self.value {
             Value::Evaluation(value) => value(record.evaluate.as_ref()?)?,
             Value::Record(value) => value(record)?,
-            Value::Own => record.own.get(self.key)?.value,
+            Value::Own => record.own.get(self.title)?.value,
         };
         Some(self.times * value).filter(|value| value.is_finite())
     }
@@ -211,9 +211,10 @@ pub(crate) fn own_metrics<'r>(records: impl Iterator<Item = &'r Record>) -> Vec<
     let mut made = |own: (String, String, Better)| {
         *known.entry(own.clone()).or_insert_with(|| {
             let (name, unit, better) = own;
-            let [name, unit] = [name, unit].map(|text| &*text.leak());
+            let [key, name, unit] =
+                [format!("metric_{name}"), name, unit].map(|text| &*text.leak());
             let kind = (better, Digits::Significant, Mean::Arithmetic);
-            let metric = Metric { times: 1.0, ..Metric::new(name, name, unit, kind, Value::Own) };
+            let metric = Metric { times: 1.0, ..Metric::new(key, name, unit, kind, Value::Own) };
             &*Box::leak(Box::new(metric))
         })
     };

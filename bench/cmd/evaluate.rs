@@ -246,7 +246,7 @@ fn described(evaluation: &Evaluation, diagonal: f64, all: bool) -> String {
         }
         return text + "\n  all metrics: --all";
     }
-    text += &line("", "%          unit of the mesh, of lengths");
+    text += &line("lengths", "%          unit of the mesh");
     let mut add = |name: &str, value: &str| text += &line(name, value);
     rows.iter().for_each(|row| add(&row.title, &cells(row)));
     add("Betti numbers", &betti);

@@ -37,7 +37,7 @@ pub struct Arguments {
     site: Option<PathBuf>,
     /// Measure a number of your own on each saved result: `facets (mm), higher=python3 facets.py`. The program gets the files of
     /// the surface and of the medial mesh, and prints the number.
-    #[arg(long, value_name = "METRIC=PROGRAM", value_parser = metric)]
+    #[arg(long, value_name = "METRIC=PROGRAM", value_parser = metric, conflicts_with = "site")]
     metric: Vec<(OwnMetric, String)>,
 }
 

@@ -9,7 +9,7 @@ use medial_run::record::Record;
 
 use super::{STUDY, inputs, records};
 use crate::exit::Failure;
-use crate::own_metric::{OwnMetric, Saved, read, write};
+use crate::own_metric::{OwnMetric, Saved, key, read, write};
 use crate::store::{Store, artifact_path};
 use crate::study::Study;
 
@@ -32,15 +32,14 @@ pub fn measure_own(
     (own.unit, own.better) = (metric.unit.clone(), metric.better);
     let mut remarks = Vec::new();
     for record in &records {
-        let Some((hash, artifact)) = record.result_hash.as_ref().zip(record.artifact.as_ref())
-        else {
+        let Some((key, artifact)) = key(record).zip(record.artifact.as_ref()) else {
             continue; // without a result, or not saved
         };
-        if own.values.contains_key(hash) {
+        if own.values.contains_key(&key) {
             continue; // also equal results of two methods
         }
         match of_record(dir, record, artifact, &inputs, &mut value) {
-            Ok(number) => drop(own.values.insert(hash.clone(), number)),
+            Ok(number) => drop(own.values.insert(key, number)),
             Err(why) => remarks.push(format!("{}, {artifact}: {why}", metric.name)),
         }
     }
@@ -55,11 +54,11 @@ fn of_record(
     inputs: &BTreeMap<String, Input>,
     value: &mut impl FnMut(&Saved<'_>) -> Result<f64, String>,
 ) -> Result<f64, String> {
-    let input = record.mesh_hash.as_ref().and_then(|hash| inputs.get(hash));
-    let input = input.ok_or("the measured surface is missing or has changed")?;
+    let hash = record.mesh_hash.as_deref().unwrap_or_default();
+    let input = inputs.get(hash).ok_or("the measured surface is missing or has changed")?;
     let path = artifact_path(dir, artifact).ok_or("not inside the folder")?;
     let axis = complex::read(&path).map_err(|error| error.to_string())?.mesh;
-    let saved = Saved { name: &record.mesh, surface: &input.mesh, axis: &axis, path: &path };
+    let saved = Saved { name: &record.mesh, hash, surface: &input.mesh, axis: &axis, path: &path };
     let number = value(&saved)?;
     if number.is_finite() { Ok(number) } else { Err(format!("the value is {number}")) }
 }

@@ -95,7 +95,7 @@ class Report:
             >>> report = compare("builtin:box", methods="qmat", spheres=[100, 50], quiet=True)
             >>> report.add_metric("mean radius", lambda mesh, axis: axis.radii.mean() / mesh.diagonal, better="neither")
             ()
-            >>> "mean radius" in report.frame()  # doctest: +SKIP
+            >>> "metric_mean radius" in report.frame()  # doctest: +SKIP
             True
         """
 

@@ -246,7 +246,7 @@ def test_a_metric_of_the_user_is_a_column(tmp_path: Path) -> None:
         if not pandas.isna(row.artifact):
             axis = MedialAxis.read(report.folder / row.artifact)
             mesh = Mesh.read("builtin:box")
-            assert row["mean radius"] == pytest.approx(axis.radii.mean() / mesh.diagonal)
+            assert row["metric_mean radius"] == pytest.approx(axis.radii.mean() / mesh.diagonal)
     assert "mean radius (diagonals)" in (report.folder / "tables" / "mesh-box.md").read_text()
     again = len(seen)
     report.add_metric("mean radius", radius, unit="diagonals", better="higher")

@@ -37,7 +37,7 @@ const NAMES: [(&str, &str); 11] = [
     ("simplify/substrates/", "substrate_"),
     ("simplify/", ""),
     ("item/machine/", ""),
-    ("item/own/", ""),
+    ("item/own/", "metric_"), // no name of a user's is that of another column
     ("item/", ""),
 ];
 

@@ -35,7 +35,7 @@ fn a_number_of_a_program_is_a_column_and_a_criterion() {
     let at = compared();
     let records = at.text("1/results.jsonl");
     at.done("report 1 --metric faces,higher=./faces");
-    let faces = column(&at, "1", "faces");
+    let faces = column(&at, "1", "metric_faces");
     assert_eq!(faces.len(), 4);
     for (artifact, value) in &faces {
         let text = at.text(format!("1/{artifact}"));
@@ -51,9 +51,9 @@ fn a_number_of_a_program_is_a_column_and_a_criterion() {
     fs::remove_file(at.at("faces")).expect("removed");
     let (_, object) = at.json("report 1 --metric faces,higher=./faces --out 2");
     assert_eq!(object["warnings"].as_array().map(Vec::len), Some(0), "{object}");
-    assert_eq!(column(&at, "2", "faces"), faces);
+    assert_eq!(column(&at, "2", "metric_faces"), faces);
     at.done("compare builtin:capsule --methods qmat,pmat --spheres 30,20 --counts-only --samples 500 --out 1 --fresh");
-    assert_eq!(column(&at, "1", "faces"), faces, "equal results have equal numbers");
+    assert_eq!(column(&at, "1", "metric_faces"), faces, "equal results have equal numbers");
 }
 
 #[test]
@@ -71,10 +71,39 @@ fn a_program_without_a_number_is_named() {
             warnings.iter().all(|warning| warning.as_str().is_some_and(|w| w.contains(words))),
             "{object}"
         );
-        assert!(column(&at, "1", "mine").is_empty());
+        assert!(column(&at, "1", "metric_mine").is_empty());
     }
     at.refused("report 1 --metric mine", 2, "expected METRIC=PROGRAM");
     at.refused("report 1 --metric mine,best=true", 2, "expected `lower`, `higher` or `neither`");
     at.write("1/metrics.json", "{\"mine\": {\"values\": {\"0\": \"high\"}}}");
     at.refused("report 1", 1, "metrics.json");
+}
+
+/// The same file as result on two meshes of one name is measured with the surface of each.
+#[test]
+fn a_number_belongs_to_a_mesh_and_a_result() {
+    let at = Folder::new();
+    at.write("ball.ma", "1 0 0\nv 0 0 0 0.5\n");
+    at.write("size", "#!/bin/sh\nwc -l < \"$1\"\n");
+    fs::set_permissions(at.at("size"), fs::Permissions::from_mode(0o755)).expect("executable");
+    for resolution in [8, 12] {
+        fs::create_dir(at.at(resolution.to_string())).expect("a folder");
+        at.done(&format!(
+            "datasets make sphere --resolution {resolution} -o {resolution}/mesh.off"
+        ));
+        at.done(&format!(
+            "compare {resolution}/mesh.off --given theirs=ball.ma --methods qmat --spheres 20 --counts-only \
+             --samples 500 --out store-{resolution}"
+        ));
+    }
+    at.done("report store-8 --metric size=./size");
+    at.done("report store-12 --metric size=./size");
+    let sizes = ["store-8", "store-12"].map(|store| {
+        let all = column(&at, store, "metric_size");
+        all.into_values().next().expect("a number")
+    });
+    at.done("report store-8 store-12 --out both");
+    let merged: std::collections::BTreeSet<String> =
+        column(&at, "both", "metric_size").into_values().collect();
+    assert!(sizes[0] != sizes[1] && merged == sizes.into_iter().collect(), "{merged:?}");
 }
