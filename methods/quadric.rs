@@ -90,7 +90,7 @@ impl Quadric {
     pub(crate) fn minimiser_at(&self, radius: f64, singular_ratio: f64) -> Option<Sphere> {
         let mut fixed = *self;
         let [_, _, _, x, _, _, y, _, z, _] = self.a;
-        // The radius becomes a term of its own, of the size of the others.
+        // The radius gets a term of its own, as large as the others, so that the system stays regular.
         let own = (self.a[0] + self.a[4] + self.a[7]) / 3.0;
         for (entry, value) in [(3, 0.0), (6, 0.0), (8, 0.0), (9, own)] {
             fixed.a[entry] = value;

@@ -58,10 +58,10 @@ const PUBLISHED: usize = 50;
 /// Largest radius as a share of the least directional width of a region.
 const WIDTH_SHARE: f64 = 0.75;
 
-/// Directions on the half-sphere beside the axes.
+/// Number of directions on the half-sphere, without the axes.
 const SPIRAL: usize = 30;
 
-/// All directions.
+/// Number of all directions.
 const DIRECTIONS: usize = SPIRAL + 3;
 
 /// Collapses between two reports of progress.

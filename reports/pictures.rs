@@ -22,7 +22,8 @@ use crate::view3d::View3d;
 pub(crate) const FOLDER: &str = "pictures";
 pub(crate) const VIEWS: &str = "views";
 
-/// Pixels of a panel, which the page shows in 1.3 to 2 of its own units, and panels in a row of the file.
+/// Width and height of a panel in pixels, and panels in a row of the file. The page shows a panel smaller, so that it stays
+/// sharp.
 const PANEL: [usize; 2] = [320, 260];
 const ACROSS: usize = 4;
 

@@ -51,7 +51,7 @@ pub(crate) struct MeshPart {
     pub(crate) view: Option<MeshView>,
 }
 
-/// A picture of a mesh's results, out of which the page cuts its panels.
+/// The picture of a mesh's results. The page shows its panels one by one.
 #[derive(Serialize)]
 pub(crate) struct MeshPicture {
     pub(crate) address: String,

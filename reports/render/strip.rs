@@ -185,7 +185,7 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// The layout of a number of panels of a size, so many in a line.
+    /// The layout of `count` panels, `across` in a line, each of `panel` pixels.
     pub(crate) fn of(count: usize, across: usize, panel: [usize; 2]) -> Self {
         let (lines, height) = (count.div_ceil(across), panel[1] + caption_height(panel));
         let (columns, bar) = (count.min(across), Bar::column(panel));
